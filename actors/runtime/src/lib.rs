@@ -1,0 +1,1 @@
+//! Envelopes, supervision, effects, the frame bus and the journal: actors that know no robot.

@@ -1,0 +1,1 @@
+//! Nine primitives and the manipulation functions built from them, as pure controllers.

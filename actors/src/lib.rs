@@ -1,0 +1,1 @@
+//! The typed messages, the five actors and the episode loop.

@@ -1,0 +1,1 @@
+//! From language and memory to goals and verified steps.

@@ -1,0 +1,1 @@
+//! Other memories behind the trait Memory, to compare with.

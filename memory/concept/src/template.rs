@@ -1,0 +1,372 @@
+//! The template library: parametric part templates read from text files.
+//!
+//! A template is data (paper, section "Stable Prior Knowledge"): parameters with units and ranges, solids and
+//! frames as expressions over them, bindings of manipulation functions, and its semantic synopsis. The file
+//! format is described in docs/templates.md.
+
+mod raw;
+
+use crate::{
+    expression::{Expression, ExpressionError},
+    literal::{Literal, ParseLiteralError},
+    pose::Pose,
+    solid::{PlacedSolid, Solid},
+};
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use thiserror::Error;
+
+/// Largest template file that is read, bytes.
+pub const MAX_TEMPLATE_BYTES: usize = 64 * 1024;
+/// Most parameters of one template.
+pub const MAX_PARAMETERS: usize = 24;
+
+/// Parameter values by name, as [`Expression::evaluate`] takes them.
+pub type Values<'a> = [(&'a str, f64)];
+
+/// Unit of a parameter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Unit {
+    /// Metres.
+    M,
+    /// Radians.
+    Rad,
+    /// A plain number.
+    One,
+}
+
+/// One dimension of the parameter space Omega_tau.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ParameterSpec {
+    /// Name, used in expressions.
+    pub name: String,
+    /// Unit of value and range.
+    pub unit: Unit,
+    /// Smallest valid value.
+    pub min: f64,
+    /// Largest valid value.
+    pub max: f64,
+    /// First guess as an expression over the measures of a segment (see [`MEASURES`]).
+    pub initial: Expression,
+    /// A parameter that perception does not fit but takes as is: its value is `initial`.
+    pub fixed: bool,
+}
+
+/// What perception measures of a segment before it knows a template; first guesses are written over these.
+///
+/// `extent_x`, `extent_y`: sides of the smallest upright rectangle round the segment seen from above, the longer
+/// first; `extent_z`: height above the support; `circle_radius`: radius of the circle fitted to its outline seen
+/// from above. Metres.
+pub const MEASURES: [&str; 4] = ["extent_x", "extent_y", "extent_z", "circle_radius"];
+
+/// By which evidence a part of this template stands out from what it lies on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SeenBy {
+    /// It rises above the support: depth shows it.
+    Depth,
+    /// It is as flat as the support: only colour shows it.
+    Color,
+}
+
+/// A noun under which people speak of a part, with the condition that its parameters must meet.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Noun {
+    /// The noun, singular, lower case.
+    pub noun: String,
+    /// Condition over the parameters; `None` if it always applies.
+    pub when: Option<Expression>,
+}
+
+/// The semantic library's entry: (tau, d, a, u), and the nouns that lead to it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Synopsis {
+    /// What the template looks like.
+    pub description: String,
+    /// How it can be interacted with.
+    pub affordance: String,
+    /// What it is used for.
+    pub intended_use: String,
+    /// Nouns, the most specific first.
+    pub nouns: Vec<Noun>,
+}
+
+/// A solid as expressions over the parameters.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SolidSpec {
+    shape: ShapeSpec,
+    position: [Expression; 3],
+}
+
+#[derive(Debug, Clone, PartialEq)]
+enum ShapeSpec {
+    Box { size: [Expression; 3] },
+    Cylinder { radius: Expression, height: Expression },
+}
+
+/// A named frame of the part, as expressions over the parameters. Its z axis points out of the part.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FrameSpec {
+    /// Name that function bindings refer to.
+    pub name: String,
+    position: [Expression; 3],
+    yaw: Expression,
+}
+
+/// A manipulation function f of F_tau: a function kind bound to a frame, with conditions and effects.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FunctionBinding {
+    /// Name, which is the skill's name: `pick`.
+    pub name: String,
+    /// Function kind, implemented in acm-skills: `grasp-from-above`.
+    pub kind: String,
+    /// The frame it acts at.
+    pub frame: String,
+    /// Named arguments as expressions over the parameters.
+    pub arguments: BTreeMap<String, Expression>,
+    /// What must hold before; variables `?self`, `?support`, `?destination`.
+    pub preconditions: Vec<Literal>,
+    /// What is declared to hold after.
+    pub effects: Vec<Literal>,
+}
+
+/// How headings of a part are equivalent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum YawSymmetry {
+    /// Any heading looks the same.
+    Continuous,
+    /// Headings that differ by a full turn divided by this number look the same.
+    Fold(u32),
+}
+
+impl YawSymmetry {
+    /// The heading equivalent to `yaw` that is nearest to `reference`, radians.
+    ///
+    /// ```
+    /// # use acm_concept::template::YawSymmetry;
+    /// use std::f64::consts::PI;
+    /// assert!((YawSymmetry::Fold(2).nearest(PI, 0.1) - 0.0).abs() < 1e-12);
+    /// assert_eq!(YawSymmetry::Continuous.nearest(1.0, 0.1), 0.1);
+    /// ```
+    pub fn nearest(self, yaw: f64, reference: f64) -> f64 {
+        match self {
+            YawSymmetry::Continuous => reference,
+            YawSymmetry::Fold(fold) => {
+                let step = std::f64::consts::TAU / f64::from(fold.max(1));
+                yaw - ((yaw - reference) / step).round() * step
+            }
+        }
+    }
+    /// Smallest difference between two headings, radians.
+    pub fn difference(self, a: f64, b: f64) -> f64 {
+        (self.nearest(a, b) - b).abs()
+    }
+}
+
+#[derive(Debug, Clone, PartialEq)]
+struct SymmetryRule {
+    fold: u32,
+    when: Option<Expression>,
+}
+
+/// A part template m = (tau, Omega, F) together with its synopsis.
+///
+/// A part's base frame has its origin at the middle of the bottom and z up.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Template {
+    /// Template type tau.
+    pub name: String,
+    /// Semantic entry.
+    pub synopsis: Synopsis,
+    /// How it stands out from its support.
+    pub seen_by: SeenBy,
+    /// Prior odds against other templates that fit as well, 1 for the plain ones.
+    pub prior: f64,
+    /// Affordance words.
+    pub affordances: Vec<String>,
+    /// Parameter space Omega.
+    pub parameters: Vec<ParameterSpec>,
+    /// Further conditions that parameters must meet together.
+    pub constraints: Vec<Expression>,
+    solids: Vec<SolidSpec>,
+    frames: Vec<FrameSpec>,
+    symmetry: Vec<SymmetryRule>,
+    /// Manipulation functions F.
+    pub functions: Vec<FunctionBinding>,
+}
+
+/// Why a template file was refused.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum TemplateError {
+    /// Not TOML, an unknown field, or a value of the wrong type.
+    #[error("template file {file}: {reason}")]
+    Format {
+        /// The file's name.
+        file: String,
+        /// The parser's message, with a suggestion where a field's name is near a known one.
+        reason: String,
+    },
+    /// A parameter range or prior that makes no sense.
+    #[error("template file {file}: parameter `{parameter}` {reason}")]
+    Parameter {
+        /// The file's name.
+        file: String,
+        /// The parameter.
+        parameter: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// An expression that cannot be read.
+    #[error("template file {file}, {place}: {source}")]
+    Expression {
+        /// The file's name.
+        file: String,
+        /// Where in the file.
+        place: String,
+        /// What is wrong.
+        source: ExpressionError,
+    },
+    /// A literal that cannot be read.
+    #[error("template file {file}, function `{function}`: {source}")]
+    Literal {
+        /// The file's name.
+        file: String,
+        /// The function.
+        function: String,
+        /// What is wrong.
+        source: ParseLiteralError,
+    },
+    /// A function that names a frame which the template does not have.
+    #[error("template file {file}: function `{function}` acts at frame `{frame}`, which is not among: {known}")]
+    UnknownFrame {
+        /// The file's name.
+        file: String,
+        /// The function.
+        function: String,
+        /// The frame it names.
+        frame: String,
+        /// The frames there are.
+        known: String,
+    },
+    /// Two files declare the same template type.
+    #[error("template file {file}: the template type `{name}` is declared twice")]
+    Duplicate {
+        /// The second file's name.
+        file: String,
+        /// The type.
+        name: String,
+    },
+}
+
+impl Template {
+    /// Reads one template file.
+    pub fn parse(file: &str, text: &str) -> Result<Template, TemplateError> {
+        raw::parse(file, text)
+    }
+    /// The solids of a part with the given parameter values, in its base frame.
+    pub fn solids(&self, values: &Values) -> Result<Vec<PlacedSolid>, ExpressionError> {
+        self.solids.iter().map(|spec| spec.evaluate(values)).collect()
+    }
+    /// A frame of a part with the given parameter values, in its base frame; `None` if there is no such frame.
+    pub fn frame(&self, name: &str, values: &Values) -> Result<Option<Pose>, ExpressionError> {
+        let Some(spec) = self.frames.iter().find(|frame| frame.name == name) else { return Ok(None) };
+        Ok(Some(Pose::from_yaw(vector(&spec.position, values)?, spec.yaw.evaluate(values)?)))
+    }
+    /// The symmetry of a part with the given parameter values.
+    pub fn yaw_symmetry(&self, values: &Values) -> Result<YawSymmetry, ExpressionError> {
+        for rule in &self.symmetry {
+            let applies = match &rule.when {
+                Some(condition) => condition.evaluate(values)? != 0.0,
+                None => true,
+            };
+            if applies {
+                return Ok(if rule.fold == 0 { YawSymmetry::Continuous } else { YawSymmetry::Fold(rule.fold) });
+            }
+        }
+        Ok(YawSymmetry::Fold(1))
+    }
+    /// The nouns that fit the given parameter values, the most specific first.
+    pub fn nouns(&self, values: &Values) -> Vec<&str> {
+        let fits = |noun: &&Noun| match &noun.when {
+            Some(condition) => condition.evaluate(values).is_ok_and(|value| value != 0.0),
+            None => true,
+        };
+        self.synopsis.nouns.iter().filter(fits).map(|noun| noun.noun.as_str()).collect()
+    }
+    /// First parameter values from the measures of a segment (in the order of [`MEASURES`]), clamped into range.
+    pub fn initial_values(&self, measures: [f64; 4]) -> Result<Vec<f64>, ExpressionError> {
+        let measures: Vec<(&str, f64)> = MEASURES.iter().copied().zip(measures).collect();
+        self.parameters.iter().map(|p| Ok(p.initial.evaluate(&measures)?.clamp(p.min, p.max))).collect()
+    }
+    /// Pairs parameter values with their names.
+    pub fn named<'a>(&'a self, values: &[f64]) -> Vec<(&'a str, f64)> {
+        self.parameters.iter().map(|p| p.name.as_str()).zip(values.iter().copied()).collect()
+    }
+    /// Whether all constraints hold at the given values.
+    pub fn admits(&self, values: &Values) -> bool {
+        let in_range = |p: &ParameterSpec| {
+            values.iter().find(|(name, _)| *name == p.name).is_some_and(|(_, v)| (p.min..=p.max).contains(v))
+        };
+        self.parameters.iter().all(in_range)
+            && self.constraints.iter().all(|c| c.evaluate(values).is_ok_and(|value| value != 0.0))
+    }
+    /// A manipulation function by name.
+    pub fn function(&self, name: &str) -> Option<&FunctionBinding> {
+        self.functions.iter().find(|function| function.name == name)
+    }
+}
+
+impl SolidSpec {
+    fn evaluate(&self, values: &Values) -> Result<PlacedSolid, ExpressionError> {
+        let solid = match &self.shape {
+            ShapeSpec::Box { size } => Solid::Box { size: vector(size, values)? },
+            ShapeSpec::Cylinder { radius, height } => {
+                Solid::Cylinder { radius: radius.evaluate(values)?, height: height.evaluate(values)? }
+            }
+        };
+        Ok(PlacedSolid { solid, pose: Pose::from_translation(vector(&self.position, values)?) })
+    }
+}
+
+fn vector(expressions: &[Expression; 3], values: &Values) -> Result<DVec3, ExpressionError> {
+    let [x, y, z] = expressions;
+    Ok(DVec3::new(x.evaluate(values)?, y.evaluate(values)?, z.evaluate(values)?))
+}
+
+/// The template and semantic libraries: fixed during an episode, ordered by template type.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct TemplateLibrary {
+    templates: BTreeMap<String, Template>,
+}
+
+impl TemplateLibrary {
+    /// Reads a library from named texts.
+    pub fn parse<'a>(files: impl IntoIterator<Item = (&'a str, &'a str)>) -> Result<TemplateLibrary, TemplateError> {
+        let mut templates = BTreeMap::new();
+        for (file, text) in files {
+            let template = Template::parse(file, text)?;
+            let name = template.name.clone();
+            if templates.insert(name.clone(), template).is_some() {
+                return Err(TemplateError::Duplicate { file: file.into(), name });
+            }
+        }
+        Ok(TemplateLibrary { templates })
+    }
+    /// A template by type.
+    pub fn get(&self, name: &str) -> Option<&Template> {
+        self.templates.get(name)
+    }
+    /// All templates in the order of their names.
+    pub fn iter(&self) -> impl Iterator<Item = &Template> {
+        self.templates.values()
+    }
+    /// The templates that carry a noun.
+    pub fn with_noun<'a>(&'a self, noun: &'a str) -> impl Iterator<Item = &'a Template> {
+        self.iter().filter(move |template| template.synopsis.nouns.iter().any(|n| n.noun == noun))
+    }
+}
+
+#[cfg(test)]
+mod tests;

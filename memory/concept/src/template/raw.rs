@@ -1,0 +1,254 @@
+//! The text of a template file, before its meaning is checked.
+
+use super::*;
+use crate::expression::Expression;
+use serde::Deserialize;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawTemplate {
+    template: String,
+    seen_by: SeenBy,
+    #[serde(default = "one")]
+    prior: f64,
+    #[serde(default)]
+    affordances: Vec<String>,
+    synopsis: RawSynopsis,
+    parameter: Vec<RawParameter>,
+    #[serde(default)]
+    constraints: Vec<String>,
+    solid: Vec<RawSolid>,
+    #[serde(default)]
+    frame: Vec<RawFrame>,
+    #[serde(default)]
+    symmetry: Vec<RawSymmetry>,
+    #[serde(default)]
+    function: Vec<RawFunction>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawSynopsis {
+    description: String,
+    affordance: String,
+    intended_use: String,
+    nouns: Vec<RawNoun>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawNoun {
+    noun: String,
+    when: Option<String>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawParameter {
+    name: String,
+    unit: Unit,
+    min: f64,
+    max: f64,
+    initial: String,
+    #[serde(default)]
+    fixed: bool,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, tag = "shape", rename_all = "kebab-case")]
+enum RawSolid {
+    Box { size: [String; 3], position: [String; 3] },
+    Cylinder { radius: String, height: String, position: [String; 3] },
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawFrame {
+    name: String,
+    position: [String; 3],
+    #[serde(default = "zero")]
+    yaw: String,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawSymmetry {
+    fold: u32,
+    when: Option<String>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawFunction {
+    name: String,
+    kind: String,
+    frame: String,
+    #[serde(default)]
+    arguments: BTreeMap<String, String>,
+    #[serde(default)]
+    preconditions: Vec<String>,
+    #[serde(default)]
+    effects: Vec<String>,
+}
+
+fn one() -> f64 {
+    1.0
+}
+fn zero() -> String {
+    "0".into()
+}
+
+pub(super) fn parse(file: &str, text: &str) -> Result<Template, TemplateError> {
+    let format = |reason: String| TemplateError::Format { file: file.into(), reason };
+    if text.len() > MAX_TEMPLATE_BYTES {
+        return Err(format(format!("larger than {MAX_TEMPLATE_BYTES} bytes")));
+    }
+    let raw: RawTemplate = toml::from_str(text).map_err(|e| format(crate::suggest::suggest(e.to_string())))?;
+    Meaning { file, names: raw.parameter.iter().map(|p| p.name.as_str()).collect() }.template(&raw)
+}
+
+/// Turns raw text into meaning; knows which names expressions may use.
+struct Meaning<'a> {
+    file: &'a str,
+    names: Vec<&'a str>,
+}
+
+impl Meaning<'_> {
+    fn template(&self, raw: &RawTemplate) -> Result<Template, TemplateError> {
+        if raw.parameter.is_empty() || raw.parameter.len() > MAX_PARAMETERS {
+            let reason = format!("needs 1 to {MAX_PARAMETERS} parameters, has {}", raw.parameter.len());
+            return Err(TemplateError::Format { file: self.file.into(), reason });
+        }
+        if raw.solid.is_empty() {
+            return Err(TemplateError::Format {
+                file: self.file.into(),
+                reason: "needs at least one [[solid]]".into(),
+            });
+        }
+        if !(raw.prior.is_finite() && raw.prior > 0.0) {
+            let reason = format!("prior {} must be a positive number", raw.prior);
+            return Err(TemplateError::Format { file: self.file.into(), reason });
+        }
+        let frames = raw.frame.iter().map(|f| self.frame(f)).collect::<Result<Vec<_>, _>>()?;
+        let symmetry = raw.symmetry.iter().map(|rule| {
+            let when = rule.when.as_deref().map(|text| self.expression("symmetry", text)).transpose()?;
+            Ok(SymmetryRule { fold: rule.fold, when })
+        });
+        Ok(Template {
+            name: raw.template.clone(),
+            synopsis: self.synopsis(&raw.synopsis)?,
+            seen_by: raw.seen_by,
+            prior: raw.prior,
+            affordances: raw.affordances.clone(),
+            parameters: raw.parameter.iter().map(|p| self.parameter(p)).collect::<Result<_, _>>()?,
+            constraints: self.expressions("constraints", &raw.constraints)?,
+            solids: raw.solid.iter().map(|s| self.solid(s)).collect::<Result<_, _>>()?,
+            functions: raw.function.iter().map(|f| self.function(f, &frames)).collect::<Result<_, _>>()?,
+            symmetry: symmetry.collect::<Result<_, _>>()?,
+            frames,
+        })
+    }
+
+    fn parameter(&self, raw: &RawParameter) -> Result<ParameterSpec, TemplateError> {
+        let wrong =
+            |reason: String| TemplateError::Parameter { file: self.file.into(), parameter: raw.name.clone(), reason };
+        if self.names.iter().filter(|name| **name == raw.name).count() > 1 {
+            return Err(wrong("is declared twice".into()));
+        }
+        if MEASURES.contains(&raw.name.as_str()) {
+            return Err(wrong("has the name of a segment measure; choose another".into()));
+        }
+        if !(raw.min.is_finite() && raw.max.is_finite() && raw.min < raw.max) {
+            return Err(wrong(format!("has the range {} to {}: min must be below max", raw.min, raw.max)));
+        }
+        if raw.unit == Unit::M && (raw.min <= 0.0 || raw.max > 5.0) {
+            return Err(wrong(format!("has the range {} to {} m: lengths must lie in (0, 5] m", raw.min, raw.max)));
+        }
+        let initial = self.expression_over(&format!("parameter `{}`", raw.name), &raw.initial, &MEASURES)?;
+        if let Some(value) = initial.evaluate(&[]).ok().filter(|value| !(raw.min..=raw.max).contains(value)) {
+            return Err(wrong(format!("starts at {value}, out of its range {} to {}", raw.min, raw.max)));
+        }
+        Ok(ParameterSpec {
+            name: raw.name.clone(),
+            unit: raw.unit,
+            min: raw.min,
+            max: raw.max,
+            initial,
+            fixed: raw.fixed,
+        })
+    }
+
+    fn synopsis(&self, raw: &RawSynopsis) -> Result<Synopsis, TemplateError> {
+        let noun = |raw: &RawNoun| {
+            let place = format!("noun `{}`", raw.noun);
+            let when = raw.when.as_deref().map(|text| self.expression(&place, text)).transpose()?;
+            Ok(Noun { noun: raw.noun.to_lowercase(), when })
+        };
+        Ok(Synopsis {
+            description: raw.description.clone(),
+            affordance: raw.affordance.clone(),
+            intended_use: raw.intended_use.clone(),
+            nouns: raw.nouns.iter().map(noun).collect::<Result<_, _>>()?,
+        })
+    }
+
+    fn solid(&self, raw: &RawSolid) -> Result<SolidSpec, TemplateError> {
+        let (shape, position) = match raw {
+            RawSolid::Box { size, position } => (ShapeSpec::Box { size: self.triple("solid", size)? }, position),
+            RawSolid::Cylinder { radius, height, position } => {
+                let (radius, height) = (self.expression("solid", radius)?, self.expression("solid", height)?);
+                (ShapeSpec::Cylinder { radius, height }, position)
+            }
+        };
+        Ok(SolidSpec { shape, position: self.triple("solid", position)? })
+    }
+
+    fn frame(&self, raw: &RawFrame) -> Result<FrameSpec, TemplateError> {
+        let place = format!("frame `{}`", raw.name);
+        let (position, yaw) = (self.triple(&place, &raw.position)?, self.expression(&place, &raw.yaw)?);
+        Ok(FrameSpec { name: raw.name.clone(), position, yaw })
+    }
+
+    fn function(&self, raw: &RawFunction, frames: &[FrameSpec]) -> Result<FunctionBinding, TemplateError> {
+        if !frames.iter().any(|frame| frame.name == raw.frame) {
+            return Err(TemplateError::UnknownFrame {
+                file: self.file.into(),
+                function: raw.name.clone(),
+                frame: raw.frame.clone(),
+                known: frames.iter().map(|frame| frame.name.as_str()).collect::<Vec<_>>().join(", "),
+            });
+        }
+        let place = format!("function `{}`", raw.name);
+        let argument = |(name, text): (&String, &String)| Ok((name.clone(), self.expression(&place, text)?));
+        let literal = |text: &String| {
+            let wrong = |source| TemplateError::Literal { file: self.file.into(), function: raw.name.clone(), source };
+            Literal::parse(text).map_err(wrong)
+        };
+        Ok(FunctionBinding {
+            name: raw.name.clone(),
+            kind: raw.kind.clone(),
+            frame: raw.frame.clone(),
+            arguments: raw.arguments.iter().map(argument).collect::<Result<_, _>>()?,
+            preconditions: raw.preconditions.iter().map(literal).collect::<Result<_, _>>()?,
+            effects: raw.effects.iter().map(literal).collect::<Result<_, _>>()?,
+        })
+    }
+
+    fn triple(&self, place: &str, texts: &[String; 3]) -> Result<[Expression; 3], TemplateError> {
+        let [x, y, z] = texts;
+        Ok([self.expression(place, x)?, self.expression(place, y)?, self.expression(place, z)?])
+    }
+    fn expressions(&self, place: &str, texts: &[String]) -> Result<Vec<Expression>, TemplateError> {
+        texts.iter().map(|text| self.expression(place, text)).collect()
+    }
+    fn expression(&self, place: &str, text: &str) -> Result<Expression, TemplateError> {
+        self.expression_over(place, text, &self.names)
+    }
+    fn expression_over(&self, place: &str, text: &str, names: &[&str]) -> Result<Expression, TemplateError> {
+        Expression::parse(text, names).map_err(|source| TemplateError::Expression {
+            file: self.file.into(),
+            place: place.into(),
+            source,
+        })
+    }
+}

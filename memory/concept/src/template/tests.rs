@@ -1,0 +1,77 @@
+use super::*;
+
+const PUCK: &str = r#"
+template = "puck"
+seen_by = "depth"
+affordances = ["graspable"]
+constraints = ["height < 2 * radius"]
+[synopsis]
+description = "a low disc"
+affordance = "grasp across"
+intended_use = "to slide"
+nouns = [{ noun = "coaster", when = "height < 0.01" }, { noun = "puck" }]
+[[parameter]]
+name = "radius"
+unit = "m"
+min = 0.01
+max = 0.1
+initial = "circle_radius"
+[[parameter]]
+name = "height"
+unit = "m"
+min = 0.005
+max = 0.05
+initial = "extent_z"
+[[solid]]
+shape = "cylinder"
+radius = "radius"
+height = "height"
+position = ["0", "0", "height / 2"]
+[[frame]]
+name = "top"
+position = ["0", "0", "height"]
+[[symmetry]]
+fold = 0
+[[function]]
+name = "pick"
+kind = "grasp-from-above"
+frame = "top"
+arguments = { width = "2 * radius" }
+preconditions = ["hand-empty()"]
+effects = ["holding(?self)", "not hand-empty()"]
+"#;
+
+#[test]
+fn a_template_is_read_and_evaluated() {
+    let puck = Template::parse("puck.toml", PUCK).unwrap();
+    let values = puck.initial_values([0.06, 0.06, 0.02, 0.03]).unwrap();
+    let named = puck.named(&values);
+    assert_eq!(values, [0.03, 0.02]);
+    assert!(puck.admits(&named));
+    assert_eq!(puck.nouns(&named), ["puck"]);
+    assert_eq!(puck.yaw_symmetry(&named).unwrap(), YawSymmetry::Continuous);
+    let solids = puck.solids(&named).unwrap();
+    assert_eq!(solids[0].solid, Solid::Cylinder { radius: 0.03, height: 0.02 });
+    assert!((puck.frame("top", &named).unwrap().unwrap().translation.z - 0.02).abs() < 1e-12);
+    assert_eq!(puck.function("pick").unwrap().effects[1].to_string(), "not hand-empty()");
+}
+
+#[test]
+fn mistakes_are_named() {
+    let error = |from: &str, to: &str| Template::parse("puck.toml", &PUCK.replace(from, to)).unwrap_err().to_string();
+    assert!(error("seen_by", "sen_by").contains("did you mean `seen_by`"));
+    assert!(error("max = 0.1\n", "max = 0.001\n").contains("`radius` has the range 0.01 to 0.001"));
+    assert!(error("max = 0.1\n", "max = 50.0\n").contains("lengths must lie in"));
+    assert!(error("initial = \"extent_z\"", "initial = \"0.2\"").contains("out of its range"));
+    assert!(error("frame = \"top\"", "frame = \"tip\"").contains("`tip`"));
+    assert!(error("\"2 * radius\"", "\"2 * radus\"").contains("`radus`"));
+    assert!(error("hand-empty()\"]", "hand empty\"]").contains("cannot read"));
+}
+
+#[test]
+fn a_type_may_be_declared_once() {
+    let twice = TemplateLibrary::parse([("a.toml", PUCK), ("b.toml", PUCK)]);
+    assert!(matches!(twice, Err(TemplateError::Duplicate { file, .. }) if file == "b.toml"));
+    let library = TemplateLibrary::parse([("a.toml", PUCK)]).unwrap();
+    assert_eq!(library.with_noun("coaster").count(), 1);
+}

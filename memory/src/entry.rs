@@ -1,0 +1,207 @@
+//! Entries of the dynamic memories.
+
+use acm_concept::{
+    color::Appearance,
+    ids::{FrameId, ObjectId, PartId, SkillId, TransitionId},
+    literal::{Literal, Place},
+    object::GroundedPart,
+    pose::Pose,
+    skill::{FailureCause, SkillReport},
+    time::Time,
+};
+use serde::{Deserialize, Serialize};
+
+/// A moment across runs: the episode's number in this memory, counted from 1, and the time within it.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct Moment {
+    /// Number of the episode.
+    pub episode: u32,
+    /// Virtual time within the episode.
+    pub time: Time,
+}
+
+/// What memory currently believes of an object's whereabouts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Presence {
+    /// Believed to be where its pose says.
+    Present,
+    /// In the robot's hand.
+    Held,
+    /// Not where it was last believed to be; where it is now is unknown.
+    Missing,
+}
+
+/// What made a change of an object's place known.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum PlaceCause {
+    /// Seen standing there.
+    Seen(FrameId),
+    /// Put there by the robot's own action.
+    Own(TransitionId),
+    /// Taken into the hand by the robot's own action.
+    Grasped(TransitionId),
+    /// Seen gone from its place.
+    Gone(FrameId),
+}
+
+/// One entry of an object's history h: where it was from when on.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct HistoryEntry {
+    /// When it became known.
+    pub moment: Moment,
+    /// Where it was; `None` while held or missing.
+    pub place: Option<Place>,
+    /// How it became known.
+    pub cause: PlaceCause,
+    /// Whether a second view or an own action confirmed it.
+    pub verified: bool,
+}
+
+/// An object of object memory: m = (id, c, {P_i}, T, s, h).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ObjectEntry {
+    /// Persistent identity.
+    pub id: ObjectId,
+    /// Most likely category.
+    pub category: String,
+    /// Probabilities of the nouns that fit, best first.
+    pub categories: Vec<(String, f64)>,
+    /// Parts with fused parameters, at their current poses.
+    pub parts: Vec<GroundedPart>,
+    /// Fused colour.
+    pub appearance: Appearance,
+    /// Whether it is there, held or missing.
+    pub presence: Presence,
+    /// What it rests on: a remembered object, or `None` for the bare support (or while held or missing).
+    pub support: Option<ObjectId>,
+    /// Symbolic state s beside pose and support.
+    pub state: Vec<Literal>,
+    /// Probability that the object exists as described, 0-1.
+    pub confidence: f64,
+    /// Whether two views or an own action confirmed it.
+    pub verified: bool,
+    /// When it was last seen.
+    pub last_seen: Moment,
+    /// The frame that last showed it.
+    pub last_frame: Option<FrameId>,
+    /// In how many frames it was seen.
+    pub views: u32,
+    /// Other identities it may be, with probabilities, if the last assignment was ambiguous.
+    pub ambiguous_with: Vec<(ObjectId, f64)>,
+    /// Where it was, oldest first.
+    pub history: Vec<HistoryEntry>,
+}
+
+impl ObjectEntry {
+    /// Pose of the main part's base frame; `None` for an entry without parts.
+    pub fn pose(&self) -> Option<Pose> {
+        self.parts.first().map(|part| part.pose.pose)
+    }
+    /// The current place: pose and support; `None` while held or missing.
+    pub fn place(&self) -> Option<Place> {
+        (self.presence == Presence::Present)
+            .then(|| self.pose().map(|pose| Place { support: self.support, pose, tolerance_m: 0.03 }))
+            .flatten()
+    }
+    /// Id of the main part.
+    pub fn main_part(&self) -> PartId {
+        PartId { object: self.id, index: 0 }
+    }
+}
+
+/// How a transition ended.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum TransitionResult {
+    /// Executed; not yet compared with what is seen.
+    Pending,
+    /// What was predicted is what was seen or felt.
+    Verified,
+    /// What was seen or felt contradicts what was predicted, or the controller failed.
+    Failed {
+        /// The kind of failure.
+        cause: FailureCause,
+        /// In words.
+        reason: String,
+    },
+    /// The bounded looks did not decide it.
+    CannotTell,
+}
+
+/// An entry of transition memory: m = (id, P, u, s_pre, s_post, r), with the report it rests on.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Transition {
+    /// Its id.
+    pub id: TransitionId,
+    /// When the skill ended.
+    pub moment: Moment,
+    /// The subtask (from 0) of the instruction that it served, if any.
+    pub subtask: Option<u32>,
+    /// State literals before, as far as they concern the skill.
+    pub before: Vec<Literal>,
+    /// The effects that were predicted.
+    pub predicted: Vec<Literal>,
+    /// State literals after, once verified or contradicted.
+    pub after: Vec<Literal>,
+    /// How it ended.
+    pub result: TransitionResult,
+    /// What the executor reported: target, action u, bound parameters, measurements.
+    pub report: SkillReport,
+}
+
+impl Transition {
+    /// The skill's name u.
+    pub fn skill(&self) -> &str {
+        &self.report.invocation.skill
+    }
+    /// The object acted on.
+    pub fn object(&self) -> ObjectId {
+        self.report.invocation.part.object
+    }
+}
+
+/// An entry of skill memory: m_u = (u, type, tau, target, pre, Phi, pi_exec, eta). Template-grounded entries
+/// are consolidated from verified transitions and carry over to every part with the same template.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SkillEntry {
+    /// Its id.
+    pub id: SkillId,
+    /// Skill name u.
+    pub skill: String,
+    /// Template type tau.
+    pub template: String,
+    /// Function kind: the execution backend.
+    pub kind: String,
+    /// Applicability conditions.
+    pub preconditions: Vec<Literal>,
+    /// Bound parameters Phi that worked, by name: running means.
+    pub parameters: Vec<(String, f64)>,
+    /// Tries so far.
+    pub tries: u32,
+    /// Verified successes so far.
+    pub successes: u32,
+    /// The transitions it rests on.
+    pub transitions: Vec<TransitionId>,
+}
+
+/// Where the agent is in its instruction. It lives in memory so that a wiped memory forgets it.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct TaskProgress {
+    /// Subtasks of the instruction that are done, in order, with the moment each was found done.
+    pub done: Vec<(u32, Moment)>,
+    /// When the instruction was given.
+    pub instructed: Moment,
+}
+
+impl TaskProgress {
+    /// Index of the first subtask that is not done.
+    pub fn current(&self) -> u32 {
+        self.done.last().map_or(0, |(index, _)| index + 1)
+    }
+    /// When the current subtask began: when the one before was done, or when the instruction was given.
+    pub fn current_since(&self) -> Moment {
+        self.done.last().map_or(self.instructed, |(_, moment)| *moment)
+    }
+}

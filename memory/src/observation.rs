@@ -1,0 +1,116 @@
+//! What memory is told of a frame and of a skill, and what it answers.
+
+use acm_concept::{
+    camera::RgbdFrame,
+    embodiment::Feedback,
+    ids::ObjectId,
+    literal::{Belief, Literal},
+    object::Percepts,
+    skill::SkillReport,
+    time::Time,
+};
+use serde::{Deserialize, Serialize};
+
+/// One grounded frame with the frame itself: a memory that keeps frames may ask perception about them later.
+#[derive(Debug, Clone)]
+pub struct Observation<'a> {
+    /// What perception says.
+    pub percepts: &'a Percepts,
+    /// The frame; cloning it copies no pixels.
+    pub frame: &'a RgbdFrame,
+    /// What the arm reported when the frame was taken.
+    pub feedback: &'a Feedback,
+}
+
+/// The identity given to one percept.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Resolved {
+    /// Index into [`Percepts::objects`].
+    pub percept: usize,
+    /// The identity.
+    pub object: ObjectId,
+    /// Whether the identity is new.
+    pub new: bool,
+    /// Probability of this assignment, 0-1.
+    pub probability: f64,
+    /// Whether memory took the percept over; if not it is kept as unverified until a second view agrees.
+    pub accepted: bool,
+}
+
+/// What an observation did to memory.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Grounding {
+    /// Identities, in the order of the percepts. Percepts held to be false alarms do not appear.
+    pub resolved: Vec<Resolved>,
+    /// Objects that are now known to be gone from their place.
+    pub missing: Vec<ObjectId>,
+    /// Objects that were seen to have moved without the robot's doing.
+    pub moved: Vec<ObjectId>,
+}
+
+/// A finished skill, to be kept as a transition.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Executed {
+    /// What the executor reported.
+    pub report: SkillReport,
+    /// The subtask it served.
+    pub subtask: Option<u32>,
+    /// The effects that were predicted.
+    pub predicted: Vec<Literal>,
+}
+
+/// The verifier's answer on one predicted literal or on all of a skill's.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Outcome {
+    /// Observed as predicted.
+    Verified,
+    /// Observed otherwise.
+    Contradicted,
+    /// Not decided by what was observed.
+    CannotTell,
+}
+
+/// The comparison of a predicted literal with what was observed.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LiteralVerdict {
+    /// The predicted literal.
+    pub literal: Literal,
+    /// What memory believes of it after the look.
+    pub observed: Belief,
+    /// The comparison.
+    pub outcome: Outcome,
+}
+
+/// The verifier's answer on a skill.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Verdict {
+    /// Contradicted if any literal is; else cannot-tell if any literal is; else verified.
+    pub outcome: Outcome,
+    /// Literal by literal.
+    pub literals: Vec<LiteralVerdict>,
+    /// One sentence for a person.
+    pub reason: String,
+}
+
+/// Other things that memory keeps.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Note {
+    /// A run begins; objects of earlier runs stay as beliefs that have to be seen again.
+    EpisodeBegan,
+    /// The instruction was given; earlier progress ends.
+    Instructed {
+        /// When.
+        time: Time,
+        /// The instruction.
+        text: String,
+    },
+    /// A subtask of the instruction was found done.
+    SubtaskDone {
+        /// When.
+        time: Time,
+        /// Its index, from 0.
+        index: u32,
+    },
+}

@@ -1,0 +1,1 @@
+//! Headless RGB-D renderer and depth-sensor model.
