@@ -1,1 +1,18 @@
-//! Envelopes, supervision, effects, the frame bus and the journal: actors that know no robot.
+//! The actor runtime: envelopes, pure cores in supervised shells, a frame bus and a journal.
+//!
+//! It knows no robot. Message bodies are whatever the crate above says, as long as they have a kind and can be
+//! written down as bytes.
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`envelope`] | what every message carries beside its body |
+//! | [`core`] | the trait of an actor's pure logic, and its outbox |
+//! | [`system`] | shells on ractor: sequencing, write-ahead journal, supervision and restart |
+//! | [`journal`] | where delivered messages are written before they are handled |
+//! | [`frame_bus`] | frames handed over by number instead of by copy |
+
+pub mod core;
+pub mod envelope;
+pub mod frame_bus;
+pub mod journal;
+pub mod system;
