@@ -1,0 +1,21 @@
+# The two commands of the README. Each does all set-up itself. CARGO_TARGET_DIR is honoured.
+cargo := scripts/cargo_with_progress.py
+target := $(or $(CARGO_TARGET_DIR),target)
+
+.PHONY: help setup demo test
+
+help:
+	@echo 'make demo   set up, build, and run one task, then the same task with its memory wiped'
+	@echo 'make test   set up, build, and run all tests'
+
+setup:
+	@scripts/setup.sh
+
+demo: setup
+	@$(cargo) build --release --locked
+	@$(target)/release/acm demo
+
+# Built first and run then: while tests run their own output must come through untouched.
+test: setup
+	@$(cargo) test --workspace --locked --no-run
+	@cargo test --workspace --locked
