@@ -115,7 +115,7 @@ fn path(graph: &Graph, from: &str, to: &str) -> Option<Vec<String>> {
         }
         for next in graph.get(last).into_iter().flatten() {
             if visited.insert(next) {
-                paths.push([path.as_slice(), &[next.clone()]].concat());
+                paths.push([path.as_slice(), std::slice::from_ref(next)].concat());
             }
         }
     }
