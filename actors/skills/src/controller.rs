@@ -1,0 +1,121 @@
+//! What a controller is, how one is started, and why one cannot be.
+
+use acm_concept::{
+    embodiment::{Command, Feedback, RobotDescription},
+    skill::{SkillInvocation, SkillReport},
+};
+use glam::DVec3;
+use thiserror::Error;
+
+/// A running skill. It ends by itself: every primitive has a time limit.
+pub trait Controller: Send {
+    /// Takes the newest feedback and says what to do for the next control tick. The first call gets the feedback
+    /// of the moment. After it has finished, every further call returns the same report.
+    fn tick(&mut self, feedback: &Feedback) -> Tick;
+}
+
+/// What a controller wants.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Tick {
+    /// Perform this command for [`RobotDescription::tick_s`] seconds, then call again.
+    Act(Command),
+    /// The skill has ended, well or badly.
+    Finished(Box<SkillReport>),
+}
+
+/// Why a skill was not even begun. Nothing has moved.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum StartError {
+    /// No controller of that kind.
+    #[error("there is no function kind `{kind}`; this build has: {known}")]
+    UnknownKind {
+        /// The kind that was asked for.
+        kind: String,
+        /// The kinds there are.
+        known: String,
+    },
+    /// An argument that the kind needs is absent, not finite or not positive.
+    #[error("`{kind}` needs a positive argument `{argument}`, got {got}: bind it in the template's function")]
+    Argument {
+        /// The function kind.
+        kind: String,
+        /// The argument's name.
+        argument: &'static str,
+        /// What was given.
+        got: String,
+    },
+    /// A pose the hand would have to take lies outside the workspace.
+    #[error("{what} at ({:.3}, {:.3}, {:.3}) m is outside the workspace ({:.3}, {:.3}, {:.3}) to ({:.3}, {:.3}, {:.3}) m",
+        position.x, position.y, position.z, min.x, min.y, min.z, max.x, max.y, max.z)]
+    OutOfReach {
+        /// Which pose.
+        what: &'static str,
+        /// TCP position, world frame, metres.
+        position: DVec3,
+        /// Smallest corner of the workspace.
+        min: DVec3,
+        /// Largest corner of the workspace.
+        max: DVec3,
+    },
+    /// The part is wider than the hand opens, across every side that can be grasped.
+    #[error("the part is {:.1} mm wide and the hand opens {:.1} mm: take another part or another function",
+        1e3 * width_m, 1e3 * opening_m)]
+    TooWide {
+        /// Narrowest side, metres.
+        width_m: f64,
+        /// Largest opening, metres.
+        opening_m: f64,
+    },
+    /// Perceived neighbours leave no room for the hand in any heading it could take.
+    #[error("no free way to {what}: in the freest heading the hand would be {:.1} mm inside a perceived neighbour: clear it first",
+        1e3 * overlap_m)]
+    Blocked {
+        /// What the hand was to do.
+        what: &'static str,
+        /// How deep the hand would be inside the neighbour, metres.
+        overlap_m: f64,
+    },
+    /// The skill needs an empty hand, but the fingers hold something.
+    #[error("`{kind}` needs an empty hand, but the fingers are held open at {:.1} mm: place what they hold first", 1e3 * opening_m)]
+    HandNotEmpty {
+        /// The function kind.
+        kind: String,
+        /// Measured opening, metres.
+        opening_m: f64,
+    },
+    /// The skill needs something in the hand, and the invocation does not say what.
+    #[error(
+        "`{kind}` needs what is held and how it sits in the hand, but the invocation names nothing: grasp it first"
+    )]
+    NothingHeld {
+        /// The function kind.
+        kind: String,
+    },
+    /// The skill needs a destination.
+    #[error("`{kind}` needs a destination, but the invocation has none: bind `?destination`")]
+    NoDestination {
+        /// The function kind.
+        kind: String,
+    },
+    /// The hand would have to tilt, which these controllers cannot.
+    #[error("to put it there the hand would have to tilt by {:.0} degrees; it only works pointing down", tilt_rad.to_degrees())]
+    Tilted {
+        /// Angle between the approach direction and straight down, radians.
+        tilt_rad: f64,
+    },
+}
+
+/// The function kinds that this build can run, in alphabetical order.
+pub fn kinds() -> &'static [&'static str] {
+    &[]
+}
+
+/// Starts the controller of `invocation.kind`. The feedback must be the present one: the motion begins where the
+/// hand is. Geometry is checked here, so that what cannot be done is refused before anything moves.
+pub fn start(
+    invocation: &SkillInvocation,
+    _robot: &RobotDescription,
+    _feedback: &Feedback,
+) -> Result<Box<dyn Controller>, StartError> {
+    Err(StartError::UnknownKind { kind: invocation.kind.clone(), known: kinds().join(", ") })
+}

@@ -1,0 +1,167 @@
+//! Straight motions of the TCP under limits: minimum-jerk legs between waypoints.
+
+use acm_concept::{embodiment::RobotDescription, pose::Pose};
+use glam::DVec3;
+use std::collections::VecDeque;
+
+/// Most ticks of one leg: a limit against descriptions with absurdly low speeds.
+const MAX_LEG_TICKS: f64 = 3000.0;
+/// Legs shorter than this are left out, metres and radians.
+const NEGLIGIBLE: f64 = 1e-5;
+/// Peak speed and peak acceleration of the minimum-jerk law 10 s^3 - 15 s^4 + 6 s^5 over unit time and distance.
+const PEAK_SPEED: f64 = 1.875;
+const PEAK_ACCELERATION: f64 = 5.774;
+
+/// How fast a motion may be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Pace {
+    pub speed_m_s: f64,
+    pub acceleration_m_s2: f64,
+    pub turn_rad_s: f64,
+    pub turn_acceleration_rad_s2: f64,
+}
+
+impl Pace {
+    /// For an empty hand in free space. A tenth of the robot's speed is kept back for its own lag.
+    pub fn free(robot: &RobotDescription) -> Pace {
+        Pace {
+            speed_m_s: 0.9 * robot.max_speed_m_s,
+            acceleration_m_s2: 2.5,
+            turn_rad_s: 0.9 * robot.max_turn_rad_s,
+            turn_acceleration_rad_s2: 15.0,
+        }
+    }
+    /// With something in the hand: slower, so that the grip need not bear more than a fraction of its weight.
+    pub fn carrying(robot: &RobotDescription) -> Pace {
+        let free = Pace::free(robot);
+        Pace {
+            speed_m_s: 0.8 * free.speed_m_s,
+            acceleration_m_s2: 1.5,
+            turn_rad_s: 0.6 * free.turn_rad_s,
+            turn_acceleration_rad_s2: 6.0,
+        }
+    }
+    /// For the first centimetres after closing or opening the fingers.
+    pub fn gentle(robot: &RobotDescription) -> Pace {
+        let free = Pace::free(robot);
+        Pace { speed_m_s: free.speed_m_s.min(0.12), acceleration_m_s2: 0.8, ..free }
+    }
+    /// Shortest time in which a leg keeps all four limits, seconds.
+    fn duration_s(&self, distance_m: f64, angle_rad: f64) -> f64 {
+        let bound = |amount: f64, speed: f64, acceleration: f64| {
+            (PEAK_SPEED * amount / speed).max((PEAK_ACCELERATION * amount / acceleration).sqrt())
+        };
+        bound(distance_m, self.speed_m_s, self.acceleration_m_s2).max(bound(
+            angle_rad,
+            self.turn_rad_s,
+            self.turn_acceleration_rad_s2,
+        ))
+    }
+}
+
+#[derive(Debug, Clone)]
+struct Leg {
+    from: Pose,
+    to: Pose,
+    ticks: u32,
+}
+
+/// Straight legs one after the other, at rest at every waypoint.
+#[derive(Debug, Clone)]
+pub(crate) struct Path {
+    legs: VecDeque<Leg>,
+    done_ticks: u32,
+    end: Pose,
+    duration_s: f64,
+}
+
+impl Path {
+    /// From a pose through waypoints.
+    pub fn through(from: Pose, waypoints: &[Pose], pace: Pace, tick_s: f64) -> Path {
+        let (mut at, mut legs, mut ticks_in_all) = (from, VecDeque::new(), 0);
+        for &to in waypoints {
+            let (distance_m, angle_rad) = (at.translation.distance(to.translation), at.angle_to(&to));
+            if distance_m < NEGLIGIBLE && angle_rad < NEGLIGIBLE {
+                continue;
+            }
+            let ticks = (pace.duration_s(distance_m, angle_rad) / tick_s).ceil().clamp(1.0, MAX_LEG_TICKS) as u32;
+            legs.push_back(Leg { from: at, to, ticks });
+            ticks_in_all += ticks;
+            at = to;
+        }
+        Path { legs, done_ticks: 0, end: at, duration_s: f64::from(ticks_in_all) * tick_s }
+    }
+    /// Up to `height_m`, level to above the goal, and straight down to it. A start above that height is left on a
+    /// slant that stays above it.
+    pub fn over(from: Pose, goal: Pose, height_m: f64, pace: Pace, tick_s: f64) -> Path {
+        let height_m = height_m.max(goal.translation.z);
+        let up = from.translation.with_z(from.translation.z.max(height_m));
+        let across = goal.translation.with_z(height_m);
+        Path::through(from, &[Pose::new(up, from.rotation), Pose::new(across, goal.rotation), goal], pace, tick_s)
+    }
+    /// Straight up or down to a height.
+    pub fn vertical(from: Pose, height_m: f64, pace: Pace, tick_s: f64) -> Path {
+        let to = Pose::new(DVec3::new(from.translation.x, from.translation.y, height_m), from.rotation);
+        Path::through(from, &[to], pace, tick_s)
+    }
+    /// The pose at the end of the next tick, or `None` when the path is done.
+    pub fn advance(&mut self) -> Option<Pose> {
+        let leg = self.legs.front()?;
+        self.done_ticks += 1;
+        if self.done_ticks >= leg.ticks {
+            let to = leg.to;
+            self.legs.pop_front();
+            self.done_ticks = 0;
+            return Some(to);
+        }
+        let s = f64::from(self.done_ticks) / f64::from(leg.ticks);
+        Some(leg.from.interpolate(&leg.to, s * s * s * (10.0 - 15.0 * s + 6.0 * s * s)))
+    }
+    /// Where it ends.
+    pub fn end(&self) -> Pose {
+        self.end
+    }
+    /// How long the whole path takes, seconds.
+    pub fn duration_s(&self) -> f64 {
+        self.duration_s
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::downward;
+    use proptest::prelude::*;
+
+    const PACE: Pace = Pace { speed_m_s: 0.4, acceleration_m_s2: 2.0, turn_rad_s: 2.0, turn_acceleration_rad_s2: 9.0 };
+    const TICK_S: f64 = 0.02;
+
+    proptest! {
+        #[test]
+        fn a_path_keeps_its_limits_and_its_height(
+            x in -0.4..0.4f64, y in -0.4..0.4f64, z in 0.0..0.5f64, heading in -3.0..3.0f64,
+            from_z in 0.0..0.5f64, height in 0.0..0.5f64,
+        ) {
+            let from = downward(DVec3::new(0.1, -0.1, from_z), 0.2);
+            let goal = downward(DVec3::new(x, y, z), heading);
+            let mut path = Path::over(from, goal, height, PACE, TICK_S);
+            let (mut at, mut speed) = (from, DVec3::ZERO);
+            while let Some(next) = path.advance() {
+                let step = next.translation - at.translation;
+                prop_assert!(step.length() <= PACE.speed_m_s * TICK_S * 1.0001);
+                // At a waypoint two ends of legs meet; each alone keeps the bound.
+                prop_assert!((step - speed).length() <= 2.0 * PACE.acceleration_m_s2 * TICK_S * TICK_S);
+                prop_assert!(at.angle_to(&next) <= PACE.turn_rad_s * TICK_S * 1.0001);
+                let level = step.truncate().length() > 1e-9;
+                prop_assert!(!level || next.translation.z >= height - 1e-9);
+                (at, speed) = (next, step);
+            }
+            prop_assert!(at.translation.distance(goal.translation) < 1e-9 && at.angle_to(&goal) < 1e-6);
+        }
+    }
+
+    #[test]
+    fn a_path_to_where_it_stands_is_empty() {
+        assert_eq!(Path::vertical(Pose::IDENTITY, 0.0, PACE, TICK_S).advance(), None);
+    }
+}
