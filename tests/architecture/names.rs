@@ -1,13 +1,23 @@
 //! The agent's source names no scenario and no object of the simulator: nothing in it can branch on one.
 
 use super::{files, read, root};
-use anyhow::Result;
+use anyhow::{Context, Result};
 use std::{collections::BTreeSet, path::Path};
 
 /// Rooms of the agent's side.
 const AGENT_ROOMS: [&str; 4] = ["actors", "llm", "memory", "perception"];
-/// Scenarios and the simulator's own object models, one a file.
+/// Scenarios, and the simulator's own object models in a folder below.
 const WORLD_DATA: &str = "sim/scenarios";
+
+/// The names that a file of the simulator's gives away: its own, the scenario's, and those of the models it declares.
+fn names(path: &Path, text: &str) -> Result<BTreeSet<String>> {
+    let table: toml::Table = text.parse().with_context(|| format!("cannot read {}", path.display()))?;
+    let models = table.get("model").and_then(|model| model.as_array()).into_iter().flatten();
+    let declared = models.filter_map(|model| model.get("model")).chain(table.get("model")).chain(table.get("scenario"));
+    let mut names: BTreeSet<String> = declared.filter_map(|name| name.as_str()).map(str::to_owned).collect();
+    names.extend(path.file_stem().map(|stem| stem.to_string_lossy().into_owned()));
+    Ok(names)
+}
 
 /// The part of a source that is compiled into the product: unit tests stand at a file's end.
 fn product(source: &str) -> &str {
@@ -32,23 +42,35 @@ fn quoted<'a>(source: &str, names: &'a BTreeSet<String>) -> Vec<(usize, &'a str)
 
 #[test]
 fn agent_source_names_no_scenario_and_no_object_model() -> Result<()> {
-    let stem = |path: &Path| path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
-    let names: BTreeSet<String> = files(&root().join(WORLD_DATA), "toml")?.iter().filter_map(|p| stem(p)).collect();
-    assert!(!names.is_empty(), "there are no files in {WORLD_DATA}: correct the path here");
-    let (mut read_files, mut complaints) = (0, Vec::new());
+    let mut world_names = BTreeSet::new();
+    for path in files(&root().join(WORLD_DATA), "toml")? {
+        world_names.extend(names(&path, &read(&path)?)?);
+    }
+    assert!(!world_names.is_empty(), "there are no files in {WORLD_DATA}: correct the path here");
+    let mut sources = Vec::new();
     for room in AGENT_ROOMS {
-        for path in files(&root().join(room), "rs")?
-            .iter()
-            .filter(|path| !is_test_file(path.strip_prefix(root()).unwrap_or(path)))
-        {
-            read_files += 1;
-            for (line, name) in quoted(product(&read(path)?), &names) {
-                complaints.push(format!("{}:{line} names `{name}` of {WORLD_DATA}", path.display()));
-            }
+        sources.extend(files(&root().join(room), "rs")?);
+    }
+    sources.retain(|path| !is_test_file(path.strip_prefix(root()).unwrap_or(path)));
+    assert!(sources.len() > 20, "found {} files only: correct the rooms here", sources.len());
+    let mut complaints = Vec::new();
+    for path in &sources {
+        for (line, name) in quoted(product(&read(path)?), &world_names) {
+            complaints.push(format!("{}:{line} names `{name}` of {WORLD_DATA}", path.display()));
         }
     }
-    assert!(read_files > 20, "found {read_files} files only: correct the rooms here");
     assert_eq!(complaints, Vec::<String>::new());
+    Ok(())
+}
+
+#[test]
+fn the_names_of_a_scenario_file_are_all_found() -> Result<()> {
+    let text = "scenario = \"tidy-desk\"\n[[object]]\nmodel = \"tray\"\n[[model]]\nmodel = \"odd-tray\"\n";
+    let found: Vec<String> = names(Path::new("a/desk.toml"), text)?.into_iter().collect();
+    assert_eq!(found, ["desk", "odd-tray", "tidy-desk"]);
+    let found: Vec<String> = names(Path::new("objects/tray.toml"), "model = \"tray-2\"")?.into_iter().collect();
+    assert_eq!(found, ["tray", "tray-2"]);
+    assert!(names(Path::new("x.toml"), "model = ").is_err());
     Ok(())
 }
 
