@@ -1,0 +1,143 @@
+// Everything is computed in the camera frame (x right, y down, z forward), where numbers are small.
+
+struct Frame {
+    clip_from_camera: mat4x4<f32>,
+    shadow_from_camera: mat4x4<f32>,
+    // xyz: towards the sun; w: its irradiance / pi.
+    sun: vec4<f32>,
+    // xyz: position; w: intensity / pi. Unused ones have intensity 0.
+    points: array<vec4<f32>, 4>,
+    // x: ambient; y: number of point lights; z: metres by which shadow look-ups are moved along the normal; w: 1 with
+    // shadows.
+    misc: vec4<f32>,
+};
+@group(0) @binding(0) var<uniform> frame: Frame;
+@group(1) @binding(0) var shadow_map: texture_depth_2d;
+@group(1) @binding(1) var shadow_sampler: sampler_comparison;
+
+struct Vertex {
+    @location(0) position: vec3<f32>,
+    @location(1) normal: vec3<f32>,
+    // Rows of the affine matrix from the mesh's frame to the camera's.
+    @location(2) row_x: vec4<f32>,
+    @location(3) row_y: vec4<f32>,
+    @location(4) row_z: vec4<f32>,
+    // xyz: scale; w: edge of a pattern cell, metres.
+    @location(5) scale: vec4<f32>,
+    // Linear colours; w of the first: kind of pattern.
+    @location(6) color: vec4<f32>,
+    @location(7) pattern: vec4<f32>,
+    @location(8) id: u32,
+};
+
+struct Surface {
+    @builtin(position) clip: vec4<f32>,
+    @location(0) position: vec3<f32>,
+    @location(1) normal: vec3<f32>,
+    @location(2) local: vec3<f32>,
+    @location(3) local_normal: vec3<f32>,
+    @location(4) @interpolate(flat) color: vec4<f32>,
+    @location(5) @interpolate(flat) pattern: vec4<f32>,
+    @location(6) @interpolate(flat) id: u32,
+};
+
+struct Pixel {
+    @location(0) color: vec4<f32>,
+    // Bits of a float: float targets cannot be drawn to everywhere.
+    @location(1) depth: u32,
+    @location(2) id: u32,
+};
+
+fn to_camera(v: Vertex) -> vec3<f32> {
+    let p = vec4<f32>(v.position, 1.0);
+    return vec3<f32>(dot(v.row_x, p), dot(v.row_y, p), dot(v.row_z, p));
+}
+
+@vertex
+fn vertex_main(v: Vertex) -> Surface {
+    var out: Surface;
+    out.position = to_camera(v);
+    out.clip = frame.clip_from_camera * vec4<f32>(out.position, 1.0);
+    // The rows already scale; normals need the inverse scale, hence the square.
+    let n = v.normal / (v.scale.xyz * v.scale.xyz);
+    out.normal = vec3<f32>(dot(v.row_x.xyz, n), dot(v.row_y.xyz, n), dot(v.row_z.xyz, n));
+    out.local = v.position * v.scale.xyz / v.scale.w;
+    out.local_normal = v.normal;
+    out.color = v.color;
+    out.pattern = v.pattern;
+    out.id = v.id;
+    return out;
+}
+
+@vertex
+fn vertex_shadow(v: Vertex) -> @builtin(position) vec4<f32> {
+    return frame.shadow_from_camera * vec4<f32>(to_camera(v), 1.0);
+}
+
+fn hash(cell: vec3<i32>) -> u32 {
+    var h = bitcast<u32>(cell.x) * 0x9E3779B1u ^ bitcast<u32>(cell.y) * 0x85EBCA77u ^ bitcast<u32>(cell.z) * 0xC2B2AE3Du;
+    h = (h ^ (h >> 15u)) * 0x2C1B3C6Du;
+    h = (h ^ (h >> 12u)) * 0x297A2D39u;
+    return h ^ (h >> 15u);
+}
+
+// Whether the pattern's colour covers this point. The coordinate along the normal is left out, because on a flat face
+// it would sit exactly on a cell border.
+fn is_painted(kind: f32, local: vec3<f32>, normal: vec3<f32>) -> bool {
+    let n = abs(normal);
+    var cell = vec3<i32>(floor(local));
+    let along_x = n.x > n.y && n.x > n.z;
+    if (along_x) {
+        cell.x = 0;
+    } else if (n.y > n.z) {
+        cell.y = 0;
+    } else {
+        cell.z = 0;
+    }
+    if (kind < 1.5) {
+        return ((cell.x + cell.y + cell.z) & 1) != 0;
+    }
+    if (kind < 2.5) {
+        return (select(cell.x, cell.y, along_x) & 1) != 0;
+    }
+    return hash(cell) % 6u == 0u;
+}
+
+fn sunlit(position: vec3<f32>, normal: vec3<f32>) -> f32 {
+    let moved = position + normal * frame.misc.z;
+    let clip = frame.shadow_from_camera * vec4<f32>(moved, 1.0);
+    let uv = clip.xy * vec2<f32>(0.5, -0.5) + vec2<f32>(0.5);
+    let lit = textureSampleCompareLevel(shadow_map, shadow_sampler, uv, clip.z);
+    let outside = any(uv < vec2<f32>(0.0)) || any(uv > vec2<f32>(1.0));
+    return select(lit, 1.0, outside || frame.misc.w < 0.5);
+}
+
+fn shade(in: Surface, base: vec3<f32>) -> Pixel {
+    var normal = normalize(in.normal);
+    // The back of an open surface is lit like a front.
+    normal = select(normal, -normal, dot(normal, in.position) > 0.0);
+    var light = frame.misc.x + frame.sun.w * max(dot(normal, frame.sun.xyz), 0.0) * sunlit(in.position, normal);
+    for (var k = 0u; k < u32(frame.misc.y); k += 1u) {
+        let towards = frame.points[k].xyz - in.position;
+        let squared = max(dot(towards, towards), 1e-4);
+        light += frame.points[k].w * max(dot(normal, towards), 0.0) / (squared * sqrt(squared));
+    }
+    let color = base * light;
+    var out: Pixel;
+    // Too much light keeps its hue instead of bleaching to white.
+    out.color = vec4<f32>(color / max(1.0, max(color.r, max(color.g, color.b))), 1.0);
+    out.depth = bitcast<u32>(in.position.z);
+    out.id = in.id;
+    return out;
+}
+
+@fragment
+fn fragment_plain(in: Surface) -> Pixel {
+    return shade(in, in.color.rgb);
+}
+
+@fragment
+fn fragment_pattern(in: Surface) -> Pixel {
+    let painted = in.color.w > 0.5 && is_painted(in.color.w, in.local, in.local_normal);
+    return shade(in, select(in.color.rgb, in.pattern.rgb, painted));
+}
