@@ -1,1 +1,35 @@
-//! From language and memory to goals and verified steps.
+//! From language and memory to goals and verified steps: the planner `rules`.
+//!
+//! Deterministic, synchronous, without state of its own: [`Planner::decide`] reads everything from a
+//! [`MemoryView`](acm_memory::MemoryView). It knows no task, no scenario and no object by name; verbs, colours and
+//! phrases are data in `lexicon/`, nouns and skills come from the template library.
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`language`] | instruction to [`Task`]: words, phrases, clauses, anaphora |
+//! | [`lexicon`] | the data that the language rules run on |
+//! | [`task`] | goals over references |
+//! | `ground` | references to objects and places, against memory |
+//! | `search` | means-ends search over the skills that memory offers |
+//! | `decide` | the order of questions before each step; limits |
+//! | [`bind`] | a step with perceived geometry, ready for a controller |
+//! | [`decision`], [`explanation`] | the answers and their reasons |
+
+pub mod bind;
+mod decide;
+pub mod decision;
+pub mod explanation;
+mod ground;
+pub mod language;
+pub mod lexicon;
+mod planner;
+mod search;
+pub mod task;
+
+pub use bind::BindError;
+pub use decision::{Decision, GiveUpCause, PlanOptions, Situation, Step, Unknown};
+pub use explanation::{Explanation, Rejected, ResolvedReference};
+pub use language::ParseError;
+pub use lexicon::{Lexicon, LexiconError};
+pub use planner::Planner;
+pub use task::{Destination, Goal, ObjectReference, Span, Subtask, Task};

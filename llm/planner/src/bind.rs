@@ -1,0 +1,180 @@
+//! A step bound to perceived geometry, ready for a controller.
+
+use crate::{
+    decision::Step,
+    ground::geometry::{Extent, solids_at},
+};
+use acm_concept::{
+    embodiment::RobotDescription,
+    expression::ExpressionError,
+    ids::{ObjectId, PartId},
+    object::GroundedPart,
+    pose::Pose,
+    skill::SkillInvocation,
+    solid::PlacedSolid,
+};
+use acm_memory::{MemoryView, entry::Presence};
+use glam::DVec3;
+use std::collections::BTreeMap;
+use thiserror::Error;
+
+/// Why a step could not be bound.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum BindError {
+    /// Memory no longer knows the part.
+    #[error("cannot bind {skill}: memory knows no part {part}; decide again")]
+    UnknownPart {
+        /// The skill.
+        skill: String,
+        /// The part.
+        part: PartId,
+    },
+    /// The library has no such template or function.
+    #[error("cannot bind {skill} on {part}: template `{template}` has no function `{skill}`")]
+    UnknownFunction {
+        /// The skill.
+        skill: String,
+        /// The part.
+        part: PartId,
+        /// The part's template.
+        template: String,
+    },
+    /// The function acts at a frame that the template does not have.
+    #[error("cannot bind {skill} on {part}: template `{template}` has no frame `{frame}`")]
+    UnknownFrame {
+        /// The skill.
+        skill: String,
+        /// The part.
+        part: PartId,
+        /// The part's template.
+        template: String,
+        /// The frame.
+        frame: String,
+    },
+    /// An expression of the template has no value at the part's parameters.
+    #[error("cannot bind {skill} on {part}: {source}")]
+    Expression {
+        /// The skill.
+        skill: String,
+        /// The part.
+        part: PartId,
+        /// What is wrong.
+        source: ExpressionError,
+    },
+    /// The skill would have to act outside the robot's workspace.
+    #[error("cannot bind {skill} on {part}: ({x_m:.3}, {y_m:.3}) m is outside the workspace of {robot}")]
+    OutOfReach {
+        /// The skill.
+        skill: String,
+        /// The part.
+        part: PartId,
+        /// The robot's name.
+        robot: String,
+        /// World x of the spot, metres.
+        x_m: f64,
+        /// World y of the spot, metres.
+        y_m: f64,
+    },
+}
+
+/// Evaluates function frame and arguments at the part's parameters and gathers what the controller must know of
+/// the surroundings: everything as perceived.
+pub(crate) fn bind(step: &Step, view: &dyn MemoryView, robot: &RobotDescription) -> Result<SkillInvocation, BindError> {
+    let candidate = &step.candidate;
+    let (skill, part_id) = (candidate.skill.clone(), candidate.part);
+    let unknown = || BindError::UnknownPart { skill: skill.clone(), part: part_id };
+    let entry = view.object(part_id.object).ok_or_else(unknown)?;
+    let part = entry.parts.get(part_id.index as usize).ok_or_else(unknown)?;
+    let (frame, arguments) = evaluate(&skill, part_id, part, view)?;
+    check_reach(step, part, &frame, robot)?;
+    let support_height_m = match &candidate.destination {
+        Some(place) => surface_height(view, place.support, place.pose.translation),
+        None => surface_height(view, entry.support, part.pose.pose.translation),
+    };
+    Ok(SkillInvocation {
+        skill,
+        entry: candidate.entry,
+        kind: candidate.kind.clone(),
+        part: part_id,
+        target: part.clone(),
+        frame,
+        arguments,
+        destination: candidate.destination,
+        obstacles: obstacles(view, part_id.object),
+        support_height_m,
+        held: held(view),
+        attempt: step.attempt,
+    })
+}
+
+fn evaluate(
+    skill: &str,
+    part_id: PartId,
+    part: &GroundedPart,
+    view: &dyn MemoryView,
+) -> Result<(Pose, BTreeMap<String, f64>), BindError> {
+    let expression = |source| BindError::Expression { skill: skill.into(), part: part_id, source };
+    let template = view.library().get(&part.template);
+    let (template, function) = template.and_then(|t| Some((t, t.function(skill)?))).ok_or_else(|| {
+        BindError::UnknownFunction { skill: skill.into(), part: part_id, template: part.template.clone() }
+    })?;
+    let values = part.values();
+    let local =
+        template.frame(&function.frame, &values).map_err(expression)?.ok_or_else(|| BindError::UnknownFrame {
+            skill: skill.into(),
+            part: part_id,
+            template: part.template.clone(),
+            frame: function.frame.clone(),
+        })?;
+    let mut arguments = BTreeMap::new();
+    for (name, value) in &function.arguments {
+        arguments.insert(name.clone(), value.evaluate(&values).map_err(expression)?);
+    }
+    Ok((part.pose.pose * local, arguments))
+}
+
+/// Only the spot seen from above is checked: how high the hand must go is the controller's business.
+fn check_reach(step: &Step, part: &GroundedPart, frame: &Pose, robot: &RobotDescription) -> Result<(), BindError> {
+    let spot = step.candidate.destination.map_or(frame.translation, |place| place.pose.translation);
+    let held_in_hand = step.candidate.destination.is_some();
+    let middle_z = 0.5 * (robot.workspace_min.z + robot.workspace_max.z);
+    let reach = |point: DVec3| robot.reaches(DVec3::new(point.x, point.y, middle_z));
+    if reach(spot) && (held_in_hand || reach(part.pose.pose.translation)) {
+        return Ok(());
+    }
+    Err(BindError::OutOfReach {
+        skill: step.candidate.skill.clone(),
+        part: step.candidate.part,
+        robot: robot.name.clone(),
+        x_m: spot.x,
+        y_m: spot.y,
+    })
+}
+
+/// Perceived height of what carries the spot: the top of the carrying object, or the support plane.
+fn surface_height(view: &dyn MemoryView, support: Option<ObjectId>, spot: DVec3) -> f64 {
+    let carrier = support.and_then(|id| view.object(id)).and_then(|entry| Extent::now(view, entry));
+    match (carrier, view.support()) {
+        (Some(extent), _) => extent.high,
+        (None, Some(plane)) => plane.height_at(spot.x, spot.y),
+        (None, None) => spot.z,
+    }
+}
+
+fn obstacles(view: &dyn MemoryView, target: ObjectId) -> Vec<(ObjectId, PlacedSolid)> {
+    let mut obstacles = Vec::new();
+    for entry in view.objects().iter().filter(|e| e.id != target && e.presence == Presence::Present) {
+        let Some(pose) = entry.pose() else { continue };
+        obstacles.extend(solids_at(view, entry, &pose).into_iter().map(|solid| (entry.id, solid)));
+    }
+    obstacles
+}
+
+/// What is held and how it sits in the hand, from the report of the grasp that took it.
+fn held(view: &dyn MemoryView) -> Option<(ObjectId, Pose, GroundedPart)> {
+    let entry = view.held()?;
+    let part = entry.parts.first()?.clone();
+    let reports = view.transitions().iter().rev().filter_map(|transition| transition.report.held);
+    let (_, pose) = reports.into_iter().find(|(object, _)| *object == entry.id)?;
+    Some((entry.id, pose, part))
+}

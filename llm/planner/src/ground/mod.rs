@@ -1,0 +1,3 @@
+//! References of a task grounded in memory.
+
+pub(crate) mod geometry;

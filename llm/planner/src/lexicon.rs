@@ -1,0 +1,249 @@
+//! Word classes, verb frames and phrase forms, read from the data files in `lexicon/`.
+//!
+//! The rules of language that name words are data; the code knows only how phrases nest. Nouns are not here:
+//! they come from the template library's synopses, and `nouns.toml` adds everyday words for them.
+
+mod raw;
+
+use crate::task::{ColorTerm, Direction, Size};
+use acm_concept::color::Lab;
+use acm_memory::query::PlaceReference;
+use std::collections::{BTreeMap, BTreeSet};
+use thiserror::Error;
+
+/// Why a lexicon file was refused.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum LexiconError {
+    /// A file that must be there is not.
+    #[error("the lexicon has no file {file}")]
+    Missing {
+        /// Its name.
+        file: String,
+    },
+    /// Not TOML, an unknown field, or a value of the wrong type.
+    #[error("lexicon file {file}: {reason}")]
+    Format {
+        /// Its name.
+        file: String,
+        /// The parser's message, with a suggestion where a field's name is near a known one.
+        reason: String,
+    },
+    /// A phrase or form with a slot or word that makes no sense there.
+    #[error("lexicon file {file}: the form `{form}` {reason}")]
+    Form {
+        /// Its name.
+        file: String,
+        /// The form.
+        form: String,
+        /// What is wrong.
+        reason: String,
+    },
+}
+
+/// A gap in a form that a phrase fills.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Slot {
+    /// The thing acted on.
+    Object,
+    /// A destination with its preposition.
+    Place,
+    /// A destination without preposition.
+    Thing,
+    /// How often.
+    Times,
+    /// The thing whose past is meant.
+    It,
+    /// "its", "the", or a genitive.
+    Its,
+    /// "its" or a genitive.
+    Genitive,
+    /// A word for a place, or a noun.
+    Spot,
+}
+
+/// One step of a form.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Element {
+    /// One of these words.
+    Words { any: Vec<String>, optional: bool },
+    /// A phrase.
+    Slot { slot: Slot, optional: bool },
+}
+
+/// A sequence of words and slots.
+pub(crate) type Form = Vec<Element>;
+
+/// What a verb frame asks for.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum FrameGoal {
+    /// The object stands at the destination.
+    At,
+    /// The object is held, or is not.
+    Holding(bool),
+    /// A function is performed on the object.
+    Performed(String),
+}
+
+/// One form of a verb frame.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct FrameForm {
+    pub form: Form,
+    pub history: Option<PlaceReference>,
+    pub times: Option<u32>,
+}
+
+/// Verbs that are used alike.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Frame {
+    pub name: String,
+    pub goal: FrameGoal,
+    pub said_of_object: bool,
+    pub forms: Vec<FrameForm>,
+}
+
+/// A phrase for a place in an object's past.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct HistoryForm {
+    pub reference: PlaceReference,
+    pub form: Form,
+}
+
+/// Closed word classes as phrases without slots.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Words {
+    pub ignored: Vec<Form>,
+    pub connectors: Vec<Form>,
+    pub lead_ins: Vec<Form>,
+    pub auxiliaries: Vec<Form>,
+    pub after_markers: Vec<Form>,
+    pub before_markers: Vec<Form>,
+    pub negations: Vec<Form>,
+    pub disturbing: Vec<Form>,
+    pub definite: Vec<Form>,
+    pub indefinite: Vec<Form>,
+    pub quantifiers: Vec<Form>,
+    pub numerals: Vec<Form>,
+    pub pronouns: Vec<Form>,
+    pub things: Vec<Form>,
+    pub places: Vec<Form>,
+    pub other: Vec<Form>,
+    pub free: Vec<Form>,
+    pub same: Vec<Form>,
+    pub prepositions: Vec<Form>,
+    pub standing: Vec<Form>,
+    pub back: Vec<Form>,
+    pub relative_links: Vec<Form>,
+    pub sources: Vec<Form>,
+    pub middle: Vec<Form>,
+    pub middle_of: Vec<Form>,
+    pub between: Vec<Form>,
+    pub whole: Vec<Form>,
+}
+
+/// Everything the front end knows of language.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Lexicon {
+    pub(crate) words: Words,
+    pub(crate) directions: Vec<(Direction, Vec<Form>)>,
+    pub(crate) beside: Vec<(Option<Direction>, Vec<Form>)>,
+    pub(crate) sizes: Vec<(Size, Vec<Form>)>,
+    pub(crate) ordinals: Vec<(u32, Form)>,
+    pub(crate) times: Vec<(u32, Form)>,
+    pub(crate) colors: Vec<(ColorTerm, Vec<Form>)>,
+    pub(crate) aliases: BTreeMap<String, String>,
+    pub(crate) plurals: BTreeMap<String, String>,
+    pub(crate) frames: Vec<Frame>,
+    /// Frames by inflected verb.
+    pub(crate) verbs: BTreeMap<String, Vec<usize>>,
+    pub(crate) history: Vec<HistoryForm>,
+    /// Every single word that some class holds, to tell an unknown noun from a misplaced word.
+    pub(crate) known_words: BTreeSet<String>,
+}
+
+impl Lexicon {
+    /// Reads a lexicon from named texts: `words.toml`, `nouns.toml`, `colors.toml`, `verbs.toml`, `history.toml`.
+    pub fn parse(files: &BTreeMap<String, String>) -> Result<Lexicon, LexiconError> {
+        raw::parse(files)
+    }
+    /// The colour terms with their prototypes.
+    pub fn colors(&self) -> impl Iterator<Item = &ColorTerm> {
+        self.colors.iter().map(|(term, _)| term)
+    }
+    /// The colour word whose prototype is nearest to a surface colour. Lightness counts half: shading changes it
+    /// most.
+    pub(crate) fn nearest_color(&self, lab: &Lab) -> Option<&ColorTerm> {
+        let distance = |term: &ColorTerm| {
+            (0.25 * (term.lab.l - lab.l).powi(2) + (term.lab.a - lab.a).powi(2) + (term.lab.b - lab.b).powi(2)).sqrt()
+        };
+        self.colors().min_by(|a, b| distance(a).total_cmp(&distance(b)))
+    }
+}
+
+/// The inflected forms of a regular verb.
+pub(crate) fn inflections(verb: &str) -> Vec<String> {
+    let mut forms =
+        vec![verb.to_owned(), format!("{verb}s"), format!("{verb}es"), format!("{verb}ing"), format!("{verb}ed")];
+    if let Some(stem) = verb.strip_suffix('e') {
+        forms.extend([format!("{stem}ing"), format!("{stem}ed")]);
+    }
+    if let Some(stem) = verb.strip_suffix('y') {
+        forms.extend([format!("{stem}ies"), format!("{stem}ied")]);
+    }
+    let mut letters = verb.chars().rev();
+    if let (Some(last), Some(before)) = (letters.next(), letters.next()) {
+        let vowel = |c: char| "aeiou".contains(c);
+        if !vowel(last) && vowel(before) && !"wxy".contains(last) {
+            forms.extend([format!("{verb}{last}ing"), format!("{verb}{last}ed")]);
+        }
+    }
+    forms
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test that panics fails, which is what it shall do")]
+    use super::*;
+
+    fn files() -> BTreeMap<String, String> {
+        crate::planner::embedded_lexicon()
+    }
+
+    #[test]
+    fn verbs_are_found_in_every_inflection() {
+        let lexicon = Lexicon::parse(&files()).unwrap();
+        for word in
+            ["put", "putting", "brought", "carries", "moving", "moved", "pressing", "grabbed", "taken", "hitting"]
+        {
+            assert!(lexicon.verbs.contains_key(word), "{word}");
+        }
+    }
+
+    #[test]
+    fn an_unknown_field_is_refused_with_a_suggestion() {
+        let mut files = files();
+        files.get_mut("nouns.toml").unwrap().push_str("\n[[alias]]\nnoun = \"mat\"\nword = [\"rug\"]\n");
+        let error = Lexicon::parse(&files).unwrap_err().to_string();
+        assert!(error.contains("nouns.toml") && error.contains("did you mean `words`"), "{error}");
+    }
+
+    #[test]
+    fn an_unknown_slot_and_a_missing_file_are_refused() {
+        let mut broken = files();
+        let text = broken["verbs.toml"].replace("{object} up|down|over? {place}", "{objekt} {place}");
+        broken.insert("verbs.toml".into(), text);
+        assert!(matches!(Lexicon::parse(&broken), Err(LexiconError::Form { form, .. }) if form.contains("objekt")));
+        let mut fewer = files();
+        fewer.remove("history.toml");
+        assert_eq!(Lexicon::parse(&fewer), Err(LexiconError::Missing { file: "history.toml".into() }));
+    }
+
+    #[test]
+    fn the_nearest_colour_word_of_a_shaded_surface_is_still_its_own() {
+        let lexicon = Lexicon::parse(&files()).unwrap();
+        for (rgb, word) in
+            [([255, 0, 0], "red"), ([120, 15, 15], "red"), ([0, 128, 254], "blue"), ([11, 153, 101], "green")]
+        {
+            assert_eq!(lexicon.nearest_color(&Lab::from_srgb(rgb)).unwrap().name, word, "{rgb:?}");
+        }
+    }
+}

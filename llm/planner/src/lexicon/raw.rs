@@ -1,0 +1,363 @@
+//! The text of the lexicon files, before their meaning is checked.
+
+use super::*;
+use acm_concept::suggest::suggest;
+use serde::Deserialize;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawWords {
+    ignored: Vec<String>,
+    connectors: Vec<String>,
+    lead_ins: Vec<String>,
+    auxiliaries: Vec<String>,
+    after_markers: Vec<String>,
+    before_markers: Vec<String>,
+    negations: Vec<String>,
+    disturbing: Vec<String>,
+    definite: Vec<String>,
+    indefinite: Vec<String>,
+    quantifiers: Vec<String>,
+    numerals: Vec<String>,
+    pronouns: Vec<String>,
+    things: Vec<String>,
+    places: Vec<String>,
+    other: Vec<String>,
+    free: Vec<String>,
+    same: Vec<String>,
+    prepositions: Vec<String>,
+    standing: Vec<String>,
+    back: Vec<String>,
+    relative_links: Vec<String>,
+    sources: Vec<String>,
+    middle: Vec<String>,
+    middle_of: Vec<String>,
+    between: Vec<String>,
+    whole: Vec<String>,
+    directions: BTreeMap<Direction, Vec<String>>,
+    beside: BTreeMap<String, Vec<String>>,
+    sizes: RawSizes,
+    ordinals: BTreeMap<String, u32>,
+    times: BTreeMap<String, u32>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawSizes {
+    large: Vec<String>,
+    small: Vec<String>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawNouns {
+    alias: Vec<RawAlias>,
+    plurals: BTreeMap<String, String>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawAlias {
+    noun: String,
+    words: Vec<String>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawColors {
+    color: Vec<RawColor>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawColor {
+    words: Vec<String>,
+    srgb: [u8; 3],
+    delta_e: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawVerbs {
+    frame: Vec<RawFrame>,
+    irregular: BTreeMap<String, Vec<String>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawFrame {
+    name: String,
+    goal: String,
+    function: Option<String>,
+    #[serde(default)]
+    said_of_object: bool,
+    verbs: Vec<String>,
+    forms: Vec<RawForm>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawForm {
+    form: String,
+    history: Option<PlaceReference>,
+    times: Option<u32>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawHistory {
+    phrase: Vec<RawHistoryPhrase>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawHistoryPhrase {
+    reference: PlaceReference,
+    forms: Vec<String>,
+}
+
+pub(super) fn parse(files: &BTreeMap<String, String>) -> Result<Lexicon, LexiconError> {
+    let words: RawWords = read(files, "words.toml")?;
+    let nouns: RawNouns = read(files, "nouns.toml")?;
+    let colors: RawColors = read(files, "colors.toml")?;
+    let verbs: RawVerbs = read(files, "verbs.toml")?;
+    let history: RawHistory = read(files, "history.toml")?;
+
+    let frames = verbs.frame.iter().map(frame).collect::<Result<Vec<_>, _>>()?;
+    let mut history_forms = Vec::new();
+    for phrase in &history.phrase {
+        for text in &phrase.forms {
+            history_forms.push(HistoryForm { reference: phrase.reference, form: form("history.toml", text)? });
+        }
+    }
+    let mut lexicon = Lexicon {
+        directions: phrases_by(&words.directions, |direction| Ok(*direction))?,
+        beside: phrases_by(&words.beside, |name| side(name))?,
+        sizes: vec![(Size::Large, phrases(&words.sizes.large)?), (Size::Small, phrases(&words.sizes.small)?)],
+        ordinals: numbers(&words.ordinals)?,
+        times: numbers(&words.times)?,
+        words: closed_classes(&words)?,
+        colors: colors.color.iter().map(color).collect::<Result<_, _>>()?,
+        aliases: nouns.alias.iter().flat_map(|a| a.words.iter().map(|w| (w.clone(), a.noun.clone()))).collect(),
+        plurals: nouns.plurals,
+        verbs: verb_forms(&verbs),
+        frames,
+        history: history_forms,
+        known_words: BTreeSet::new(),
+    };
+    lexicon.known_words = known_words(&lexicon);
+    Ok(lexicon)
+}
+
+fn read<T: for<'de> Deserialize<'de>>(files: &BTreeMap<String, String>, file: &str) -> Result<T, LexiconError> {
+    let text = files.get(file).ok_or_else(|| LexiconError::Missing { file: file.into() })?;
+    toml::from_str(text).map_err(|e| LexiconError::Format { file: file.into(), reason: suggest(e.to_string()) })
+}
+
+fn closed_classes(raw: &RawWords) -> Result<Words, LexiconError> {
+    Ok(Words {
+        ignored: phrases(&raw.ignored)?,
+        connectors: phrases(&raw.connectors)?,
+        lead_ins: phrases(&raw.lead_ins)?,
+        auxiliaries: phrases(&raw.auxiliaries)?,
+        after_markers: phrases(&raw.after_markers)?,
+        before_markers: phrases(&raw.before_markers)?,
+        negations: phrases(&raw.negations)?,
+        disturbing: phrases(&raw.disturbing)?,
+        definite: phrases(&raw.definite)?,
+        indefinite: phrases(&raw.indefinite)?,
+        quantifiers: phrases(&raw.quantifiers)?,
+        numerals: phrases(&raw.numerals)?,
+        pronouns: phrases(&raw.pronouns)?,
+        things: phrases(&raw.things)?,
+        places: phrases(&raw.places)?,
+        other: phrases(&raw.other)?,
+        free: phrases(&raw.free)?,
+        same: phrases(&raw.same)?,
+        prepositions: phrases(&raw.prepositions)?,
+        standing: phrases(&raw.standing)?,
+        back: phrases(&raw.back)?,
+        relative_links: phrases(&raw.relative_links)?,
+        sources: phrases(&raw.sources)?,
+        middle: phrases(&raw.middle)?,
+        middle_of: phrases(&raw.middle_of)?,
+        between: phrases(&raw.between)?,
+        whole: phrases(&raw.whole)?,
+    })
+}
+
+fn frame(raw: &RawFrame) -> Result<Frame, LexiconError> {
+    let wrong = |reason: &str| LexiconError::Form {
+        file: "verbs.toml".into(),
+        form: raw.name.clone(),
+        reason: reason.to_owned(),
+    };
+    let goal = match (raw.goal.as_str(), &raw.function) {
+        ("at", None) => FrameGoal::At,
+        ("holding", None) => FrameGoal::Holding(true),
+        ("not-holding", None) => FrameGoal::Holding(false),
+        ("performed", Some(function)) => FrameGoal::Performed(function.clone()),
+        ("performed", None) => return Err(wrong("has the goal `performed` and names no function")),
+        _ => {
+            return Err(wrong(
+                "needs one of the goals at, holding, not-holding, performed; only `performed` has a function",
+            ));
+        }
+    };
+    let read =
+        |raw: &RawForm| Ok(FrameForm { form: form("verbs.toml", &raw.form)?, history: raw.history, times: raw.times });
+    let forms = raw.forms.iter().map(read).collect::<Result<_, _>>()?;
+    Ok(Frame { name: raw.name.clone(), goal, said_of_object: raw.said_of_object, forms })
+}
+
+fn verb_forms(raw: &RawVerbs) -> BTreeMap<String, Vec<usize>> {
+    let mut verbs: BTreeMap<String, Vec<usize>> = BTreeMap::new();
+    for (index, frame) in raw.frame.iter().enumerate() {
+        for verb in &frame.verbs {
+            let irregular = raw.irregular.get(verb).cloned().unwrap_or_default();
+            for form in inflections(verb).into_iter().chain(irregular) {
+                let frames = verbs.entry(form).or_default();
+                if !frames.contains(&index) {
+                    frames.push(index);
+                }
+            }
+        }
+    }
+    verbs
+}
+
+fn color(raw: &RawColor) -> Result<(ColorTerm, Vec<Form>), LexiconError> {
+    let wrong = |reason: &str| LexiconError::Format { file: "colors.toml".into(), reason: reason.to_owned() };
+    let name = raw.words.first().ok_or_else(|| wrong("a colour without words"))?.clone();
+    if !(raw.delta_e.is_finite() && raw.delta_e > 0.0) {
+        return Err(wrong(&format!("the colour {name} needs a positive delta_e")));
+    }
+    Ok((ColorTerm { name, lab: Lab::from_srgb(raw.srgb), delta_e: raw.delta_e }, phrases(&raw.words)?))
+}
+
+fn side(name: &str) -> Result<Option<Direction>, LexiconError> {
+    Ok(Some(match name {
+        "left" => Direction::Left,
+        "right" => Direction::Right,
+        "front" => Direction::Front,
+        "back" => Direction::Back,
+        "any" => return Ok(None),
+        other => {
+            let reason = format!("[beside] has `{other}`, which is not among left, right, front, back, any");
+            return Err(LexiconError::Format { file: "words.toml".into(), reason });
+        }
+    }))
+}
+
+fn phrases(texts: &[String]) -> Result<Vec<Form>, LexiconError> {
+    let mut forms = Vec::with_capacity(texts.len());
+    for text in texts {
+        let read = form("words.toml", text)?;
+        if read.iter().any(|element| matches!(element, Element::Slot { .. })) || read.is_empty() {
+            let reason = "must be words without slots".to_owned();
+            return Err(LexiconError::Form { file: "words.toml".into(), form: text.clone(), reason });
+        }
+        forms.push(read);
+    }
+    Ok(forms)
+}
+
+fn phrases_by<K: Ord, T>(
+    raw: &BTreeMap<K, Vec<String>>,
+    key: impl Fn(&K) -> Result<T, LexiconError>,
+) -> Result<Vec<(T, Vec<Form>)>, LexiconError> {
+    raw.iter().map(|(name, texts)| Ok((key(name)?, phrases(texts)?))).collect()
+}
+
+fn numbers(raw: &BTreeMap<String, u32>) -> Result<Vec<(u32, Form)>, LexiconError> {
+    raw.iter().map(|(text, number)| Ok((*number, form("words.toml", text)?))).collect()
+}
+
+fn form(file: &str, text: &str) -> Result<Form, LexiconError> {
+    let wrong = |reason: String| LexiconError::Form { file: file.into(), form: text.into(), reason };
+    let mut elements = Vec::new();
+    for word in text.split_whitespace() {
+        let (body, optional) = match word.strip_suffix('?') {
+            Some(body) => (body, true),
+            None => (word, false),
+        };
+        let element = match body.strip_prefix('{').and_then(|rest| rest.strip_suffix('}')) {
+            Some(name) => Element::Slot {
+                slot: slot(name).ok_or_else(|| wrong(format!("has the unknown slot `{{{name}}}`")))?,
+                optional,
+            },
+            None => {
+                let any: Vec<String> = body.split('|').map(str::to_owned).collect();
+                if any.iter().any(String::is_empty) || body.contains(['{', '}']) {
+                    return Err(wrong("has an empty alternative or a broken slot".into()));
+                }
+                Element::Words { any, optional }
+            }
+        };
+        elements.push(element);
+    }
+    Ok(elements)
+}
+
+fn slot(name: &str) -> Option<Slot> {
+    Some(match name {
+        "object" => Slot::Object,
+        "place" => Slot::Place,
+        "thing" => Slot::Thing,
+        "times" => Slot::Times,
+        "it" => Slot::It,
+        "its" => Slot::Its,
+        "genitive" => Slot::Genitive,
+        "spot" => Slot::Spot,
+        _ => return None,
+    })
+}
+
+fn known_words(lexicon: &Lexicon) -> BTreeSet<String> {
+    let w = &lexicon.words;
+    let closed = [
+        &w.ignored,
+        &w.connectors,
+        &w.lead_ins,
+        &w.auxiliaries,
+        &w.after_markers,
+        &w.before_markers,
+        &w.negations,
+        &w.disturbing,
+        &w.definite,
+        &w.indefinite,
+        &w.quantifiers,
+        &w.numerals,
+        &w.pronouns,
+        &w.things,
+        &w.places,
+        &w.other,
+        &w.free,
+        &w.same,
+        &w.prepositions,
+        &w.standing,
+        &w.back,
+        &w.relative_links,
+        &w.sources,
+        &w.middle,
+        &w.middle_of,
+        &w.between,
+    ];
+    let classes = closed.into_iter().flatten();
+    let directions = lexicon.directions.iter().flat_map(|(_, forms)| forms);
+    let beside = lexicon.beside.iter().flat_map(|(_, forms)| forms);
+    let sizes = lexicon.sizes.iter().flat_map(|(_, forms)| forms);
+    let colors = lexicon.colors.iter().flat_map(|(_, forms)| forms);
+    let numbers = lexicon.ordinals.iter().chain(&lexicon.times).map(|(_, form)| form);
+    let history = lexicon.history.iter().map(|history| &history.form);
+    let frames = lexicon.frames.iter().flat_map(|frame| frame.forms.iter().map(|form| &form.form));
+    let forms =
+        classes.chain(directions).chain(beside).chain(sizes).chain(colors).chain(numbers).chain(history).chain(frames);
+    let mut known: BTreeSet<String> = lexicon.verbs.keys().cloned().collect();
+    for element in forms.flatten() {
+        if let Element::Words { any, .. } = element {
+            known.extend(any.iter().cloned());
+        }
+    }
+    known
+}

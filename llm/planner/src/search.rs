@@ -1,0 +1,1 @@
+//! Means-ends search over the skills that memory offers.

@@ -1,0 +1,330 @@
+//! What an instruction asks for: goals over references that are resolved when their subtask is due.
+
+use acm_concept::{color::Lab, template::TemplateLibrary};
+use acm_memory::query::PlaceReference;
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// Bytes `start..end` of the instruction.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Span {
+    /// First byte.
+    pub start: usize,
+    /// One past the last byte.
+    pub end: usize,
+}
+
+impl Span {
+    /// The smallest span that covers both.
+    pub fn join(self, other: Span) -> Span {
+        Span { start: self.start.min(other.start), end: self.end.max(other.end) }
+    }
+    /// The words of `text` that the span covers; empty if it does not fit the text.
+    pub fn of(self, text: &str) -> &str {
+        text.get(self.start..self.end).unwrap_or_default()
+    }
+}
+
+/// An instruction as read: subtasks in the order in which they are to be done. It holds no knowledge of the
+/// scene: the same task can be decided on against any memory.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Task {
+    /// The instruction as given.
+    pub instruction: String,
+    /// What is to be done, in order.
+    pub subtasks: Vec<Subtask>,
+    /// The things that the instruction speaks of; [`ReferenceIndex`] points here.
+    pub references: Vec<ObjectReference>,
+    /// Things that must not be acted on ("do not touch the blue cube").
+    pub untouched: Vec<ReferenceIndex>,
+    /// The library's nouns that the instruction uses, for the prior of perception.
+    pub nouns: Vec<String>,
+}
+
+/// Index into [`Task::references`]. Two phrases that mean the same thing have the same index.
+pub type ReferenceIndex = usize;
+
+/// One thing to bring about.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Subtask {
+    /// The words that ask for it.
+    pub text: String,
+    /// Where they stand in the instruction.
+    pub span: Span,
+    /// What shall be so.
+    pub goal: Goal,
+}
+
+/// What a subtask brings about.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Goal {
+    /// The object stands at a destination.
+    At {
+        /// What is moved.
+        object: ReferenceIndex,
+        /// Where to.
+        destination: Destination,
+    },
+    /// The object is in the hand, or no longer is.
+    Holding {
+        /// What is held.
+        object: ReferenceIndex,
+        /// Whether it shall be so.
+        held: bool,
+    },
+    /// A function has been performed on the object a number of times since the subtask began.
+    Performed {
+        /// Name of the function: `press`.
+        function: String,
+        /// What it is performed on.
+        object: ReferenceIndex,
+        /// How often.
+        times: u32,
+    },
+}
+
+impl Goal {
+    /// The object that the goal is about.
+    pub fn object(&self) -> ReferenceIndex {
+        match self {
+            Goal::At { object, .. } | Goal::Holding { object, .. } | Goal::Performed { object, .. } => *object,
+        }
+    }
+    /// Whether reaching the goal may move its object.
+    pub fn moves(&self) -> bool {
+        matches!(self, Goal::At { .. } | Goal::Holding { .. })
+    }
+}
+
+/// Where something shall come to stand.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Destination {
+    /// On top of a thing, at its centre.
+    On {
+        /// The thing.
+        reference: ReferenceIndex,
+    },
+    /// In the middle of a group of things; without a group, of the largest group of like places.
+    Middle {
+        /// The group.
+        of: Option<ReferenceIndex>,
+    },
+    /// Half way between two things.
+    Between {
+        /// One of them.
+        first: ReferenceIndex,
+        /// The other.
+        second: ReferenceIndex,
+    },
+    /// Beside a thing.
+    Beside {
+        /// The thing.
+        reference: ReferenceIndex,
+        /// On which side; `None` for any.
+        side: Option<Direction>,
+    },
+    /// Where an object was.
+    History {
+        /// The object.
+        object: ReferenceIndex,
+        /// Which of its places.
+        reference: PlaceReference,
+    },
+}
+
+/// A direction as seen by somebody who stands behind the robot's base: world x points right, world y away.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Direction {
+    /// Towards negative x.
+    Left,
+    /// Towards positive x.
+    Right,
+    /// Near, towards negative y.
+    Front,
+    /// Far, towards positive y.
+    Back,
+}
+
+impl Direction {
+    /// The unit vector in the world's x-y plane.
+    pub fn vector(self) -> glam::DVec2 {
+        match self {
+            Direction::Left => glam::DVec2::NEG_X,
+            Direction::Right => glam::DVec2::X,
+            Direction::Front => glam::DVec2::NEG_Y,
+            Direction::Back => glam::DVec2::Y,
+        }
+    }
+}
+
+/// How many things a phrase means.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Quantity {
+    /// The one that fits: more than one is ambiguous.
+    TheOne,
+    /// Any one that fits.
+    AnyOne,
+    /// All that fit, as a group.
+    Group,
+}
+
+/// A choice by size.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Size {
+    /// The largest by volume.
+    Large,
+    /// The smallest by volume.
+    Small,
+}
+
+/// A colour word with its meaning.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ColorTerm {
+    /// The word's main form.
+    pub name: String,
+    /// Prototype.
+    pub lab: Lab,
+    /// How far from the prototype a surface may look, CIE76 delta E.
+    pub delta_e: f64,
+}
+
+/// A choice by rank along a direction.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Rank {
+    /// The n-th, counted from 0, starting at the given side.
+    FromSide(u32, Direction),
+    /// The one nearest to the middle of its kind.
+    Middle,
+}
+
+/// A description of a thing. Positions in it ("left", "on the mat") are meant as they were when the subtask
+/// `subtask` began, so that a description stays true of what was moved because of it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ObjectReference {
+    /// The words.
+    pub phrase: String,
+    /// Where they stand in the instruction.
+    pub span: Span,
+    /// The subtask that introduced the thing.
+    pub subtask: u32,
+    /// How many are meant.
+    pub quantity: Quantity,
+    /// The library's noun; `None` for words like "thing".
+    pub noun: Option<String>,
+    /// Function that it must offer.
+    pub function: Option<String>,
+    /// Affordance that it must have.
+    pub affordance: Option<String>,
+    /// Colour.
+    pub color: Option<ColorTerm>,
+    /// Choice by size.
+    pub size: Option<Size>,
+    /// Choice by place among those that fit.
+    pub rank: Option<Rank>,
+    /// Nothing stands on it.
+    pub free: bool,
+    /// Where it stood.
+    pub located: Option<Box<Destination>>,
+    /// Not these ("the other cube").
+    pub other_than: Vec<ReferenceIndex>,
+}
+
+impl Task {
+    /// The goals alone, one a line, with things numbered in the order in which they are named. Two instructions
+    /// that ask for the same have the same outline, whatever nouns and colours they use.
+    pub fn outline(&self) -> Vec<String> {
+        let mut order: Vec<ReferenceIndex> = Vec::new();
+        let mut number = |index: ReferenceIndex| match order.iter().position(|&known| known == index) {
+            Some(place) => format!("#{place}"),
+            None => {
+                order.push(index);
+                format!("#{}", order.len() - 1)
+            }
+        };
+        let mut lines = Vec::with_capacity(self.subtasks.len());
+        for subtask in &self.subtasks {
+            lines.push(match &subtask.goal {
+                Goal::At { object, destination } => {
+                    let object = number(*object);
+                    let to = match destination {
+                        Destination::On { reference } => format!("on {}", number(*reference)),
+                        Destination::Middle { .. } => "middle".into(),
+                        Destination::Between { first, second } => {
+                            format!("between {} and {}", number(*first), number(*second))
+                        }
+                        Destination::Beside { reference, side } => format!("beside {} {side:?}", number(*reference)),
+                        Destination::History { object, reference } => format!("{reference:?} of {}", number(*object)),
+                    };
+                    format!("at({object}, {to})")
+                }
+                Goal::Holding { object, held: true } => format!("holding({})", number(*object)),
+                Goal::Holding { object, held: false } => format!("not holding({})", number(*object)),
+                Goal::Performed { function, object, times } => format!("{function}({}) x{times}", number(*object)),
+            });
+        }
+        lines
+    }
+    /// A goal in words.
+    pub fn describe(&self, goal: &Goal) -> String {
+        let name = |index: &ReferenceIndex| {
+            self.references.get(*index).map_or_else(|| format!("reference {index}"), |r| format!("\"{}\"", r.phrase))
+        };
+        match goal {
+            Goal::At { object, destination } => match destination {
+                Destination::On { reference } => format!("{} stands on {}", name(object), name(reference)),
+                Destination::Middle { of: Some(group) } => {
+                    format!("{} stands in the middle of {}", name(object), name(group))
+                }
+                Destination::Middle { of: None } => format!("{} stands in the middle of the places", name(object)),
+                Destination::Between { first, second } => {
+                    format!("{} stands between {} and {}", name(object), name(first), name(second))
+                }
+                Destination::Beside { reference, .. } => format!("{} stands beside {}", name(object), name(reference)),
+                Destination::History { object: of, reference } => {
+                    format!("{} stands {}", name(object), history_phrase(*reference, &name(of)))
+                }
+            },
+            Goal::Holding { object, held: true } => format!("{} is in the hand", name(object)),
+            Goal::Holding { object, held: false } => format!("{} is put down", name(object)),
+            Goal::Performed { function, object, times } => format!("{function} {} x{times}", name(object)),
+        }
+    }
+}
+
+/// "where X came from" and its like.
+pub(crate) fn history_phrase(reference: PlaceReference, name: &str) -> String {
+    match reference {
+        PlaceReference::Now => format!("where {name} is now"),
+        PlaceReference::BeforeMoved => format!("where {name} came from"),
+        PlaceReference::AtStart => format!("where {name} was at the start"),
+    }
+}
+
+/// Names of the library's functions that declare an effect with this predicate, without doubles.
+pub(crate) fn functions_with_effect<'a>(library: &'a TemplateLibrary, predicate: &str) -> Vec<&'a str> {
+    let mut names: Vec<&str> = library
+        .iter()
+        .flat_map(|template| &template.functions)
+        .filter(|f| f.effects.iter().any(|effect| effect.predicate == predicate && !effect.negated))
+        .map(|f| f.name.as_str())
+        .collect();
+    names.sort_unstable();
+    names.dedup();
+    names
+}
+
+impl fmt::Display for Task {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (index, subtask) in self.subtasks.iter().enumerate() {
+            let separator = if index == 0 { "" } else { "; " };
+            write!(f, "{separator}{}. {}", index + 1, self.describe(&subtask.goal))?;
+        }
+        Ok(())
+    }
+}
