@@ -1,5 +1,10 @@
 //! What a controller is, how one is started, and why one cannot be.
 
+use crate::{
+    functions::{grasp_from_above::GraspFromAbove, place_upright::PlaceUpright, press_down::PressDown},
+    hand::Hand,
+    run::Run,
+};
 use acm_concept::{
     embodiment::{Command, Feedback, RobotDescription},
     skill::{SkillInvocation, SkillReport},
@@ -107,15 +112,30 @@ pub enum StartError {
 
 /// The function kinds that this build can run, in alphabetical order.
 pub fn kinds() -> &'static [&'static str] {
-    &[]
+    &["grasp-from-above", "place-upright", "press-down"]
 }
 
 /// Starts the controller of `invocation.kind`. The feedback must be the present one: the motion begins where the
 /// hand is. Geometry is checked here, so that what cannot be done is refused before anything moves.
 pub fn start(
     invocation: &SkillInvocation,
-    _robot: &RobotDescription,
-    _feedback: &Feedback,
+    robot: &RobotDescription,
+    feedback: &Feedback,
 ) -> Result<Box<dyn Controller>, StartError> {
-    Err(StartError::UnknownKind { kind: invocation.kind.clone(), known: kinds().join(", ") })
+    let hand = Hand::new(robot, feedback);
+    Ok(match invocation.kind.as_str() {
+        "grasp-from-above" => {
+            let function = GraspFromAbove::plan(invocation, &hand, feedback)?;
+            Box::new(Run::new(invocation, hand, function))
+        }
+        "place-upright" => {
+            let function = PlaceUpright::plan(invocation, &hand, feedback)?;
+            Box::new(Run::new(invocation, hand, function))
+        }
+        "press-down" => {
+            let function = PressDown::plan(invocation, &hand, feedback)?;
+            Box::new(Run::new(invocation, hand, function))
+        }
+        other => return Err(StartError::UnknownKind { kind: other.into(), known: kinds().join(", ") }),
+    })
 }

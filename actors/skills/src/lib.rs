@@ -31,11 +31,16 @@
 //!
 //! The hand works pointing down: the TCP's z axis along the world's -z.
 
+mod clearance;
 pub mod controller;
+mod descent;
+mod functions;
 mod geometry;
 mod hand;
 mod motion;
+mod primitives;
 pub mod retreat;
+mod run;
 
 pub use controller::{Controller, StartError, Tick, kinds, start};
 pub use retreat::{Retreat, RetreatTick, retreat};

@@ -73,6 +73,8 @@ pub(crate) struct Path {
     done_ticks: u32,
     end: Pose,
     duration_s: f64,
+    pace: Pace,
+    tick_s: f64,
 }
 
 impl Path {
@@ -89,7 +91,7 @@ impl Path {
             ticks_in_all += ticks;
             at = to;
         }
-        Path { legs, done_ticks: 0, end: at, duration_s: f64::from(ticks_in_all) * tick_s }
+        Path { legs, done_ticks: 0, end: at, duration_s: f64::from(ticks_in_all) * tick_s, pace, tick_s }
     }
     /// Up to `height_m`, level to above the goal, and straight down to it. A start above that height is left on a
     /// slant that stays above it.
@@ -116,6 +118,11 @@ impl Path {
         }
         let s = f64::from(self.done_ticks) / f64::from(leg.ticks);
         Some(leg.from.interpolate(&leg.to, s * s * s * (10.0 - 15.0 * s + 6.0 * s * s)))
+    }
+    /// Begins anew from a pose at rest, through the waypoints that are left.
+    pub fn restart(&mut self, from: Pose) {
+        let waypoints: Vec<Pose> = self.legs.iter().map(|leg| leg.to).collect();
+        *self = Path::through(from, &waypoints, self.pace, self.tick_s);
     }
     /// Where it ends.
     pub fn end(&self) -> Pose {

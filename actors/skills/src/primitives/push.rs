@@ -1,0 +1,115 @@
+//! Push: press straight down with closed fingers until the force or the travel says that it is enough.
+
+use super::{Failure, Outcome, Primitive, Step};
+use crate::{descent::Descent, hand::Hand};
+use acm_concept::{embodiment::Feedback, primitive::Primitive as Kind, skill::FailureCause};
+
+/// Speed of pressing, m/s.
+const PRESSING_M_S: f64 = 0.03;
+/// Upward force that tells that the fingers touch something, newtons.
+const TOUCH_N: f64 = 2.0;
+/// Below this the fingers are taken to be free; the last such height is where the touch began, newtons.
+const FREE_N: f64 = 0.6;
+/// Most force that is ever applied, newtons.
+const MOST_N: f64 = 25.0;
+/// How far beyond the stroke the hand may follow a cap that has no end, metres.
+const OVERTRAVEL_M: f64 = 0.004;
+/// How long the cap is held down, seconds.
+const HOLD_S: f64 = 0.1;
+
+/// The numbers of a push.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct PushPlan {
+    /// Perceived TCP height at the touch, metres.
+    pub surface_m: f64,
+    /// How far below it a touch is still looked for, metres.
+    pub search_m: f64,
+    /// How far the pressed thing may have to travel, metres.
+    pub stroke_m: f64,
+    /// The force at which it is taken to be at its end, newtons; at most 25 N are used.
+    pub force_n: f64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Phase {
+    Seek,
+    Press,
+    Hold { ticks: u32 },
+}
+
+/// From above the part, fingers closed, at rest and with the wrist's zero taken, to pressed.
+#[derive(Debug)]
+pub(crate) struct Push {
+    plan: PushPlan,
+    phase: Phase,
+    descent: Descent,
+    lowest_seek_m: f64,
+    touch_height_m: f64,
+    travel_m: f64,
+    force_n: f64,
+    limit_s: f64,
+}
+
+impl Push {
+    pub fn new(hand: &Hand, plan: PushPlan) -> Push {
+        let from_m = hand.command.tcp.translation.z;
+        let lowest_seek_m = plan.surface_m - plan.search_m;
+        // The wrist yields under force, so the command goes on a little below where the hand is.
+        let floor_m = lowest_seek_m - plan.stroke_m - 2.0 * OVERTRAVEL_M;
+        let descent = Descent::new(hand, floor_m, PRESSING_M_S, MOST_N);
+        let limit_s = descent.duration_s(from_m) + HOLD_S;
+        Push {
+            plan: PushPlan { force_n: plan.force_n.min(MOST_N), ..plan },
+            phase: Phase::Seek,
+            descent,
+            lowest_seek_m,
+            touch_height_m: from_m,
+            travel_m: 0.0,
+            force_n: 0.0,
+            limit_s,
+        }
+    }
+}
+
+impl Primitive for Push {
+    fn kind(&self) -> Kind {
+        Kind::Push
+    }
+    fn limit_s(&self) -> f64 {
+        self.limit_s
+    }
+    fn tick(&mut self, hand: &mut Hand, feedback: &Feedback) -> Step {
+        let (force_n, height_m) = (hand.felt_n().z, feedback.tcp.translation.z);
+        if self.phase == Phase::Seek {
+            if force_n < FREE_N {
+                self.touch_height_m = height_m;
+            }
+            if force_n > TOUCH_N {
+                self.phase = Phase::Press;
+            } else if hand.command.tcp.translation.z <= self.lowest_seek_m {
+                let reason =
+                    format!("touched nothing down to {:.0} mm below the perceived surface", 1e3 * self.plan.search_m);
+                return Step::Failed(Failure::new(FailureCause::Press, reason));
+            }
+        }
+        if self.phase != Phase::Seek {
+            self.force_n = self.force_n.max(force_n);
+            self.travel_m = self.travel_m.max(self.touch_height_m - height_m);
+        }
+        if let Phase::Hold { ticks } = &mut self.phase {
+            *ticks += 1;
+            if *ticks > hand.ticks(HOLD_S) {
+                return Step::Done(Outcome::Pushed { force_n: self.force_n, travel_m: self.travel_m });
+            }
+            return Step::Act;
+        }
+        let newest_n = (feedback.wrist_force_n - hand.baseline_n()).z;
+        let pressed = self.phase == Phase::Press
+            && (force_n >= self.plan.force_n || self.travel_m > self.plan.stroke_m + OVERTRAVEL_M);
+        if pressed || newest_n >= MOST_N || !self.descent.step(hand) {
+            self.force_n = self.force_n.max(force_n);
+            self.phase = Phase::Hold { ticks: 0 };
+        }
+        Step::Act
+    }
+}
