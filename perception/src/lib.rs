@@ -1,1 +1,43 @@
 //! RGB-D frames, nominal calibration and the memory's expectation in; grounded analytic concepts with uncertainty out.
+//!
+//! Geometry first, without learned weights: the support plane is found, what rises above it is cut into segments,
+//! flat patches are found by colour, and the templates of the library are fitted to each by robust least squares.
+//! [`Grounder::ground`] never fails: a frame that cannot be read is an ordinary answer with a [`Blindness`] and no
+//! objects.
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`config`], [`grounder`] | thresholds; the whole pipeline |
+//! | [`frames`], [`level`] | colour and depth files; the camera pose over the dominant plane when none is known |
+//! | `scan`, `support`, `scene`, `own` | pixels to points, the plane and its extent, heights, the robot's own pixels |
+//! | `segments`, `patches` | what stands on the plane, what lies in it |
+//! | `measure`, `fit`, `hypotheses` | first guesses, template fits, the choice among templates |
+//! | `expected`, `raster` | the comparison with memory's expectation, ray-cast |
+//! | [`overlay`], [`labels`], [`metrics`] | pictures for a person, label images, segmentation scores |
+//!
+//! [`Blindness`]: acm_concept::object::Blindness
+
+pub mod config;
+pub mod frames;
+pub mod grounder;
+pub mod labels;
+pub mod level;
+pub mod metrics;
+pub mod overlay;
+
+mod expected;
+mod fit;
+mod grid;
+mod hypotheses;
+mod measure;
+mod own;
+mod patches;
+mod raster;
+mod scan;
+mod scene;
+mod segments;
+mod support;
+
+pub use config::GrounderConfig;
+pub use grounder::Grounder;
+pub use level::level;

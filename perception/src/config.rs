@@ -1,0 +1,102 @@
+//! The thresholds of the pipeline, in one place.
+
+/// Thresholds of a [`Grounder`](crate::Grounder). The defaults hold for D435- and Kinect-class cameras that look at
+/// a table from 0.4 to 2 m; lengths in metres, angles in radians, colour differences in units of CIELAB.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GrounderConfig {
+    /// Seed of the sampling in the plane search. The same frame and seed give the same answer.
+    pub seed: u64,
+    /// Nearest depth that is believed.
+    pub depth_min_m: f32,
+    /// Farthest depth that is believed.
+    pub depth_max_m: f32,
+    /// Stereo noise is `noise_m * z^2` with z in metres: 0.08 pixels of disparity at 385 pixels and 50 mm baseline.
+    pub noise_m: f64,
+    /// Noise below which no depth is believed to be, at any distance.
+    pub noise_floor_m: f64,
+    /// A frame with less than this share of measured pixels is blind.
+    pub min_depth_fraction: f64,
+    /// A frame whose brighter pixels (95th percentile of 0-255) are darker than this is black.
+    pub min_brightness: u8,
+    /// The support must cover at least this share of the measured pixels.
+    pub min_support_fraction: f64,
+    /// Largest angle between the support's normal and the world's z axis.
+    pub max_support_tilt_rad: f64,
+    /// Tilts of the support up to this are taken for calibration error: objects are then reported exactly upright.
+    pub upright_tolerance_rad: f64,
+    /// How far the robot's own solids are grown before their pixels are taken out.
+    pub robot_margin_m: f64,
+    /// How far the robot's pixels are grown in the image.
+    pub robot_margin_px: usize,
+    /// Smallest height above the plane that counts as standing on it, before noise is taken into account.
+    pub min_height_m: f32,
+    /// Nothing higher than this above the support is an object on it.
+    pub max_height_m: f32,
+    /// Segments with fewer pixels are dropped.
+    pub min_segment_px: usize,
+    /// Most objects that one frame reports, the largest first.
+    pub max_objects: usize,
+    /// A flat patch must differ from the support's colour by this much chroma, illumination taken out.
+    pub patch_contrast: f32,
+    /// Shortest side of a flat patch.
+    pub min_patch_m: f64,
+    /// Most surface points that one fit looks at.
+    pub max_fit_points: usize,
+    /// Most outline points that one fit looks at.
+    pub max_fit_outline: usize,
+    /// Spread of outline points round the true outline, pixels.
+    pub outline_sigma_px: f64,
+    /// Factor on the odds of a template that carries a noun of the instruction.
+    pub noun_boost: f64,
+    /// Factor on the odds of the template under which memory knows the thing.
+    pub memory_boost: f64,
+    /// Factor from the fit's own standard deviation to a calibrated one.
+    pub sigma_factor: f64,
+    /// Systematic error that no averaging removes.
+    pub sigma_floor_m: f64,
+    /// Systematic error as a share of the distance.
+    pub sigma_range: f64,
+    /// Objects with a lower confidence are not reported.
+    pub min_confidence: f64,
+}
+
+impl Default for GrounderConfig {
+    fn default() -> Self {
+        GrounderConfig {
+            seed: 0x0ac3,
+            depth_min_m: 0.12,
+            depth_max_m: 6.0,
+            noise_m: 0.08 / (385.0 * 0.05),
+            noise_floor_m: 0.001,
+            min_depth_fraction: 0.02,
+            min_brightness: 10,
+            min_support_fraction: 0.08,
+            max_support_tilt_rad: 10f64.to_radians(),
+            upright_tolerance_rad: 2f64.to_radians(),
+            robot_margin_m: 0.012,
+            robot_margin_px: 3,
+            min_height_m: 0.006,
+            max_height_m: 0.6,
+            min_segment_px: 120,
+            max_objects: 64,
+            patch_contrast: 13.0,
+            min_patch_m: 0.025,
+            max_fit_points: 450,
+            max_fit_outline: 160,
+            outline_sigma_px: 1.5,
+            noun_boost: 4.0,
+            memory_boost: 1.5,
+            sigma_factor: 1.7,
+            sigma_floor_m: 0.003,
+            sigma_range: 0.005,
+            min_confidence: 0.15,
+        }
+    }
+}
+
+impl GrounderConfig {
+    /// Standard deviation of a depth of `z` metres, metres.
+    pub fn depth_sigma_m(&self, z: f64) -> f64 {
+        (self.noise_m * z * z).max(self.noise_floor_m)
+    }
+}

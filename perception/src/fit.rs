@@ -1,0 +1,14 @@
+//! Fits a template to the evidence of one segment: robust least squares over surface points and outline.
+
+mod evidence;
+mod minimise;
+mod model;
+mod profile;
+
+pub(crate) use evidence::{Evidence, OutlineKind, OutlinePoint};
+pub(crate) use minimise::{Minimum, cost, minimise, rough_cost};
+pub(crate) use model::{Base, Model, corners};
+pub(crate) use profile::observability;
+
+#[cfg(test)]
+mod tests;

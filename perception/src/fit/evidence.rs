@@ -1,0 +1,155 @@
+//! What a segment offers to a fit: points of its surface and points of its outline.
+
+use crate::{
+    scene::Scene,
+    segments::{NONE, Segments},
+};
+use acm_concept::{camera::Intrinsics, pose::Pose};
+use glam::{DVec2, DVec3};
+
+/// A measured point of the surface.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct SurfacePoint {
+    /// Support frame, metres.
+    pub position: DVec3,
+    /// Standard deviation, metres.
+    pub sigma_m: f64,
+}
+
+/// What lies on the other side of an outline point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum OutlineKind {
+    /// Something farther: the outline is the thing's own.
+    Own,
+    /// Something as near, such as the surface it stands on: the thing reaches at least to here.
+    Contact,
+    /// Something nearer, the robot, or the image border: the thing reaches at least to here.
+    Cut,
+}
+
+/// A point of a segment's outline.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct OutlinePoint {
+    pub pixel: DVec2,
+    pub sigma_px: f64,
+    pub kind: OutlineKind,
+}
+
+/// Everything that a fit compares a template with.
+#[derive(Debug, Clone)]
+pub(crate) struct Evidence {
+    /// Pose of the camera in the support frame.
+    pub camera: Pose,
+    pub intrinsics: Intrinsics,
+    pub points: Vec<SurfacePoint>,
+    /// Independent measurements per point: neighbouring depths err together.
+    pub point_weight: f64,
+    pub outline: Vec<OutlinePoint>,
+    /// Independent measurements per outline point.
+    pub outline_weight: f64,
+}
+
+/// Pixels over which depth errors are about equal.
+const CORRELATED_PX: f64 = 15.0;
+/// Outline pixels over which errors are about equal.
+const CORRELATED_OUTLINE_PX: f64 = 3.0;
+/// How far the other side of a hole is looked for, pixels.
+const HOLE_REACH: usize = 14;
+
+impl Evidence {
+    /// The evidence of a segment of standing pixels.
+    pub fn of_segment(scene: &Scene, segments: &Segments, pixels: &[usize]) -> Evidence {
+        let noise = (1.3 * scene.noise_ratio).clamp(0.4, 1.2);
+        let step = (pixels.len() / scene.config.max_fit_points.max(1)).max(1);
+        let surface_point = |&pixel: &usize| {
+            let position = scene.measured(pixel)?;
+            let sigma = noise * scene.config.depth_sigma_m(f64::from(scene.scan.depth[pixel]));
+            Some(SurfacePoint { position, sigma_m: sigma.hypot(0.0015) })
+        };
+        let points: Vec<SurfacePoint> = pixels.iter().step_by(step).filter_map(surface_point).collect();
+        let outline = outline(scene, segments, pixels);
+        Evidence::new(scene, points, pixels.len(), outline)
+    }
+
+    /// Evidence from parts; the outline is thinned and the weights are set for correlated errors.
+    pub fn new(scene: &Scene, points: Vec<SurfacePoint>, pixels: usize, outline: Vec<OutlinePoint>) -> Evidence {
+        let outline_pixels = outline.len();
+        let step = (outline_pixels / scene.config.max_fit_outline.max(1)).max(1);
+        let outline: Vec<OutlinePoint> = outline.into_iter().step_by(step).collect();
+        let weight = |independent: f64, count: usize| (independent / count.max(1) as f64).min(1.0);
+        Evidence {
+            camera: scene.camera,
+            intrinsics: scene.scan.intrinsics,
+            point_weight: weight(pixels as f64 / CORRELATED_PX, points.len()),
+            outline_weight: weight(outline_pixels as f64 / CORRELATED_OUTLINE_PX, outline.len()),
+            points,
+            outline,
+        }
+    }
+
+    /// Number of independent measurements.
+    pub fn independent(&self) -> f64 {
+        self.points.len() as f64 * self.point_weight + self.outline.len() as f64 * self.outline_weight
+    }
+    /// Share of the outline that something else, or the image border, cuts off.
+    pub fn cut_share(&self) -> f64 {
+        let cut = self.outline.iter().filter(|point| point.kind == OutlineKind::Cut).count();
+        cut as f64 / self.outline.len().max(1) as f64
+    }
+}
+
+/// Midpoints between pixels of the segment and their neighbours outside it.
+fn outline(scene: &Scene, segments: &Segments, pixels: &[usize]) -> Vec<OutlinePoint> {
+    let Some(&first) = pixels.first() else { return Vec::new() };
+    let label = segments.labels[first];
+    let mut points = Vec::new();
+    for &pixel in pixels {
+        for (dx, dy) in [(1isize, 0isize), (0, 1), (-1, 0), (0, -1)] {
+            let next = scene.grid.offset(pixel, dx, dy);
+            if next.is_some_and(|n| segments.labels[n] == label) {
+                continue;
+            }
+            let Some((kind, over_hole)) = other_side(scene, segments, label, pixel, dx, dy) else { continue };
+            let at = DVec2::new(scene.grid.column(pixel) as f64, scene.grid.row(pixel) as f64);
+            let sigma_px = scene.config.outline_sigma_px * if over_hole { 1.7 } else { 1.0 };
+            points.push(OutlinePoint { pixel: at + DVec2::new(dx as f64, dy as f64) * 0.5, sigma_px, kind });
+        }
+    }
+    points
+}
+
+/// What lies beyond a border pixel, and whether a hole had to be crossed; `None` if the segment goes on beyond it.
+fn other_side(
+    scene: &Scene,
+    segments: &Segments,
+    label: u32,
+    pixel: usize,
+    dx: isize,
+    dy: isize,
+) -> Option<(OutlineKind, bool)> {
+    let z = scene.scan.smooth[pixel];
+    let tolerance = 0.006 + 0.006 * z;
+    for step in 1..=HOLE_REACH as isize {
+        let Some(at) = scene.grid.offset(pixel, dx * step, dy * step) else {
+            return Some((OutlineKind::Cut, step > 1));
+        };
+        if segments.labels[at] == label {
+            return None;
+        }
+        if scene.own[at] {
+            return Some((OutlineKind::Cut, step > 1));
+        }
+        if scene.is_known(at) {
+            let gap = scene.scan.smooth[at] - z;
+            let kind = if gap > tolerance {
+                OutlineKind::Own
+            } else if gap < -tolerance && segments.labels[at] != NONE {
+                OutlineKind::Cut
+            } else {
+                OutlineKind::Contact
+            };
+            return Some((kind, step > 1));
+        }
+    }
+    Some((OutlineKind::Own, true))
+}

@@ -1,0 +1,159 @@
+//! A template as a function from a state vector to residuals against evidence.
+
+use super::evidence::{Evidence, OutlineKind};
+use crate::scene::{convex_hull, distance_outside};
+use acm_concept::{
+    pose::Pose,
+    solid::{PlacedSolid, Solid},
+    template::{Template, YawSymmetry},
+};
+use glam::{DVec2, DVec3};
+
+/// What the part stands on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Base {
+    /// On a surface at this height above the plane, metres.
+    At(f64),
+    /// On nothing that is seen: the height is fitted, beginning here.
+    Free(f64),
+}
+
+/// A template whose free quantities are laid out in a state vector:
+/// x, y, heading (unless any heading looks the same), base height (if free), fitted parameters.
+#[derive(Debug, Clone)]
+pub(crate) struct Model<'a> {
+    pub template: &'a Template,
+    /// Whether the heading is fitted.
+    pub turns: bool,
+    pub base: Base,
+    /// Indices of the fitted parameters.
+    free: Vec<usize>,
+    /// All parameter values; those of fitted parameters are replaced by the state.
+    initial: Vec<f64>,
+}
+
+/// A state read back.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Placement {
+    /// Pose of the part's base frame in the support frame.
+    pub pose: Pose,
+    /// All parameter values, in the template's order.
+    pub values: Vec<f64>,
+}
+
+/// Circle points that stand for the rim of a cylinder in its outline.
+const RIM: usize = 24;
+
+impl<'a> Model<'a> {
+    /// A model whose parameters begin at `initial`; `None` if the template's symmetry cannot be evaluated.
+    pub fn new(template: &'a Template, initial: Vec<f64>, base: Base) -> Option<Model<'a>> {
+        let symmetry = template.yaw_symmetry(&template.named(&initial)).ok()?;
+        let free = (0..template.parameters.len()).filter(|&i| !template.parameters[i].fixed).collect();
+        Some(Model { template, turns: symmetry != YawSymmetry::Continuous, base, free, initial })
+    }
+    /// Index of the heading in the state.
+    pub fn yaw_index(&self) -> Option<usize> {
+        self.turns.then_some(2)
+    }
+    /// Index of the base height in the state.
+    pub fn base_index(&self) -> Option<usize> {
+        matches!(self.base, Base::Free(_)).then_some(2 + usize::from(self.turns))
+    }
+    /// Index in the state of a template parameter, if it is fitted.
+    pub fn parameter_index(&self, parameter: usize) -> Option<usize> {
+        let place = self.free.iter().position(|&i| i == parameter)?;
+        Some(2 + usize::from(self.turns) + usize::from(self.base_index().is_some()) + place)
+    }
+    /// The state at a place and heading with the initial parameters.
+    pub fn start(&self, position: DVec2, yaw: f64) -> Vec<f64> {
+        let mut state = vec![position.x, position.y];
+        if self.turns {
+            state.push(yaw);
+        }
+        if let Base::Free(height) = self.base {
+            state.push(height);
+        }
+        state.extend(self.free.iter().map(|&i| self.initial[i]));
+        state
+    }
+    /// Reads a state.
+    pub fn placement(&self, state: &[f64]) -> Placement {
+        let yaw = self.yaw_index().map_or(0.0, |i| state[i]);
+        let height = match self.base {
+            Base::At(height) => height,
+            Base::Free(_) => self.base_index().map_or(0.0, |i| state[i]),
+        };
+        let mut values = self.initial.clone();
+        for &parameter in &self.free {
+            if let Some(i) = self.parameter_index(parameter) {
+                values[parameter] = state[i];
+            }
+        }
+        Placement { pose: Pose::from_yaw(DVec3::new(state[0], state[1], height), yaw), values }
+    }
+    /// Moves fitted parameters into their ranges.
+    pub fn clamp(&self, state: &mut [f64]) {
+        for &parameter in &self.free {
+            let spec = &self.template.parameters[parameter];
+            if let Some(i) = self.parameter_index(parameter) {
+                state[i] = state[i].clamp(spec.min, spec.max);
+            }
+        }
+    }
+    /// The solids at a state, in the support frame; empty if the template's expressions cannot be evaluated.
+    pub fn solids(&self, state: &[f64]) -> Vec<PlacedSolid> {
+        let placement = self.placement(state);
+        let solids = self.template.solids(&self.template.named(&placement.values)).unwrap_or_default();
+        solids.into_iter().map(|s| PlacedSolid { solid: s.solid, pose: placement.pose * s.pose }).collect()
+    }
+
+    /// Fills `residuals` with one number per surface point and per outline point, in standard deviations.
+    pub fn residuals(&self, state: &[f64], evidence: &Evidence, residuals: &mut Vec<f64>) {
+        residuals.clear();
+        let solids = self.solids(state);
+        let local: Vec<(Pose, Solid)> = solids.iter().map(|s| (s.pose.inverse(), s.solid)).collect();
+        for point in &evidence.points {
+            let distance =
+                |(inverse, solid): &(Pose, Solid)| solid.signed_distance(inverse.transform_point(point.position));
+            let nearest = local.iter().map(distance).fold(f64::INFINITY, f64::min);
+            residuals.push(if nearest.is_finite() { nearest / point.sigma_m } else { 1e3 });
+        }
+        let to_camera = evidence.camera.inverse();
+        let outlines: Vec<Vec<DVec2>> = solids.iter().map(|s| image_outline(s, &to_camera, evidence)).collect();
+        for point in &evidence.outline {
+            let distance = |outline: &Vec<DVec2>| distance_outside(outline, point.pixel);
+            let outside = outlines.iter().filter(|o| o.len() > 2).map(distance).fold(f64::INFINITY, f64::min);
+            let outside = if outside.is_finite() { outside } else { 1e3 };
+            let outside = if point.kind == OutlineKind::Own { outside } else { outside.max(0.0) };
+            residuals.push(outside / point.sigma_px);
+        }
+    }
+}
+
+/// The outline of a solid in the image: the convex hull of its projected corners.
+fn image_outline(solid: &PlacedSolid, to_camera: &Pose, evidence: &Evidence) -> Vec<DVec2> {
+    let pose = *to_camera * solid.pose;
+    let project = |corner: DVec3| evidence.intrinsics.project(pose.transform_point(corner));
+    convex_hull(corners(&solid.solid).into_iter().filter_map(project).collect())
+}
+
+/// Corners of a box, or points of both rims of a cylinder, in the solid's frame.
+pub(crate) fn corners(solid: &Solid) -> Vec<DVec3> {
+    match *solid {
+        Solid::Box { size } => {
+            let half = size * 0.5;
+            let sign = |bit: usize| if bit == 0 { -1.0 } else { 1.0 };
+            (0..8).map(|i| half * DVec3::new(sign(i & 1), sign(i & 2), sign(i & 4))).collect()
+        }
+        Solid::Cylinder { radius, height } => {
+            // The polygon's mean radius, not its corners', equals the circle's.
+            let angle = std::f64::consts::TAU / RIM as f64;
+            let reach = radius * (1.0 + angle * angle / 24.0);
+            let point = |i: usize| {
+                let at = DVec2::from_angle(angle * (i / 2) as f64) * reach;
+                at.extend(if i.is_multiple_of(2) { -height * 0.5 } else { height * 0.5 })
+            };
+            (0..2 * RIM).map(point).collect()
+        }
+    }
+}

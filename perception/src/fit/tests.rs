@@ -1,0 +1,1 @@
+//! Fits against evidence made by hand.

@@ -1,0 +1,183 @@
+//! Image-shaped arrays: neighbours, morphology, connected components.
+
+/// The shape of a row-by-row image.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Grid {
+    pub width: usize,
+    pub height: usize,
+}
+
+impl Grid {
+    pub fn len(self) -> usize {
+        self.width * self.height
+    }
+    pub fn index(self, column: usize, row: usize) -> usize {
+        row * self.width + column
+    }
+    pub fn column(self, index: usize) -> usize {
+        index % self.width
+    }
+    pub fn row(self, index: usize) -> usize {
+        index / self.width
+    }
+    /// The index `dx` columns and `dy` rows away, if that is in the image.
+    pub fn offset(self, index: usize, dx: isize, dy: isize) -> Option<usize> {
+        let column = self.column(index).checked_add_signed(dx)?;
+        let row = self.row(index).checked_add_signed(dy)?;
+        (column < self.width && row < self.height).then(|| self.index(column, row))
+    }
+    /// The four direct neighbours that are in the image.
+    pub fn neighbours(self, index: usize) -> impl Iterator<Item = usize> {
+        [(1, 0), (0, 1), (-1, 0), (0, -1)].into_iter().filter_map(move |(dx, dy)| self.offset(index, dx, dy))
+    }
+
+    /// For every pixel, the extreme of a square window of half width `radius` under `pick`.
+    pub fn window(self, values: &[f32], radius: usize, pick: fn(f32, f32) -> f32) -> Vec<f32> {
+        let mut across = values.to_vec();
+        for row in 0..self.height {
+            let line = &values[row * self.width..(row + 1) * self.width];
+            for column in 0..self.width {
+                let (from, to) = (column.saturating_sub(radius), (column + radius).min(self.width - 1));
+                across[row * self.width + column] = line[from..=to].iter().copied().reduce(pick).unwrap_or(0.0);
+            }
+        }
+        let mut both = across.clone();
+        for row in 0..self.height {
+            let (from, to) = (row.saturating_sub(radius), (row + radius).min(self.height - 1));
+            for other in from..=to {
+                for column in 0..self.width {
+                    let at = row * self.width + column;
+                    both[at] = pick(both[at], across[other * self.width + column]);
+                }
+            }
+        }
+        both
+    }
+
+    /// Number of set pixels in the square window of half width `radius` round each pixel.
+    pub fn count(self, mask: &[bool], radius: usize) -> Vec<u16> {
+        let mut across = vec![0u16; self.len()];
+        for row in 0..self.height {
+            let line = &mask[row * self.width..(row + 1) * self.width];
+            let mut sum = line.iter().take(radius.min(self.width)).filter(|set| **set).count() as u16;
+            for column in 0..self.width {
+                if column + radius < self.width {
+                    sum += u16::from(line[column + radius]);
+                }
+                across[row * self.width + column] = sum;
+                if column >= radius {
+                    sum -= u16::from(line[column - radius]);
+                }
+            }
+        }
+        let mut both = vec![0u16; self.len()];
+        for column in 0..self.width {
+            let mut sum: u16 = (0..radius.min(self.height)).map(|row| across[row * self.width + column]).sum();
+            for row in 0..self.height {
+                if row + radius < self.height {
+                    sum += across[(row + radius) * self.width + column];
+                }
+                both[row * self.width + column] = sum;
+                if row >= radius {
+                    sum -= across[(row - radius) * self.width + column];
+                }
+            }
+        }
+        both
+    }
+    /// The mask grown by a square of half width `radius`.
+    pub fn dilate(self, mask: &[bool], radius: usize) -> Vec<bool> {
+        self.count(mask, radius).into_iter().map(|n| n > 0).collect()
+    }
+    /// The mask shrunk by a square of half width `radius`; the image border does not shrink it.
+    pub fn erode(self, mask: &[bool], radius: usize) -> Vec<bool> {
+        let inverse: Vec<bool> = mask.iter().map(|set| !set).collect();
+        self.count(&inverse, radius).into_iter().map(|n| n == 0).collect()
+    }
+
+    /// Four-connected components of the set pixels that `joined` allows to be linked: a label for every pixel
+    /// (`u32::MAX` for background) and the sizes.
+    pub fn components(self, mask: &[bool], joined: impl Fn(usize, usize) -> bool) -> (Vec<u32>, Vec<usize>) {
+        let mut sets = DisjointSets::new(self.len());
+        for index in (0..self.len()).filter(|&i| mask[i]) {
+            if self.column(index) + 1 < self.width && mask[index + 1] && joined(index, index + 1) {
+                sets.join(index, index + 1);
+            }
+            if index + self.width < self.len() && mask[index + self.width] && joined(index, index + self.width) {
+                sets.join(index, index + self.width);
+            }
+        }
+        let (mut names, mut labels, mut sizes) = (vec![u32::MAX; self.len()], vec![u32::MAX; self.len()], Vec::new());
+        for index in (0..self.len()).filter(|&i| mask[i]) {
+            let root = sets.root(index);
+            if names[root] == u32::MAX {
+                names[root] = sizes.len() as u32;
+                sizes.push(0);
+            }
+            labels[index] = names[root];
+            sizes[names[root] as usize] += 1;
+        }
+        (labels, sizes)
+    }
+}
+
+/// Disjoint sets with path halving.
+#[derive(Debug)]
+pub(crate) struct DisjointSets {
+    parent: Vec<u32>,
+}
+
+impl DisjointSets {
+    pub fn new(count: usize) -> DisjointSets {
+        DisjointSets { parent: (0..count as u32).collect() }
+    }
+    pub fn root(&mut self, mut index: usize) -> usize {
+        while self.parent[index] as usize != index {
+            self.parent[index] = self.parent[self.parent[index] as usize];
+            index = self.parent[index] as usize;
+        }
+        index
+    }
+    /// Joins two sets; the smaller index stays the root, so that names do not depend on the order of joins.
+    pub fn join(&mut self, a: usize, b: usize) {
+        let (a, b) = (self.root(a), self.root(b));
+        let (low, high) = (a.min(b), a.max(b));
+        self.parent[high] = low as u32;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GRID: Grid = Grid { width: 5, height: 4 };
+
+    fn mask(text: &str) -> Vec<bool> {
+        text.chars().filter(|c| !c.is_whitespace()).map(|c| c == '#').collect()
+    }
+
+    #[test]
+    fn counting_and_morphology_respect_borders() {
+        let dot = mask("..... ..... ....# .....");
+        assert_eq!(GRID.dilate(&dot, 1), mask("..... ...## ...## ...##"));
+        let block = mask("###.. ###.. ###.. .....");
+        assert_eq!(GRID.erode(&block, 1), mask("##... ##... ..... ....."));
+        assert_eq!(GRID.count(&block, 4)[0], 9);
+    }
+
+    #[test]
+    fn components_are_numbered_in_reading_order() {
+        let (labels, sizes) = GRID.components(&mask("#.#.. #.### ..... ####."), |_, _| true);
+        assert_eq!(sizes, [2, 4, 4]);
+        assert_eq!((labels[0], labels[2], labels[9], labels[15]), (0, 1, 1, 2));
+        let (_, cut) = GRID.components(&mask("##### ..... ..... ....."), |a, b| (a, b) != (1, 2));
+        assert_eq!(cut, [2, 3]);
+    }
+
+    #[test]
+    fn windows_take_the_extreme_over_a_square() {
+        let values: Vec<f32> = (0..20).map(|i| i as f32).collect();
+        let high = GRID.window(&values, 1, f32::max);
+        assert_eq!((high[0], high[19], high[7]), (6.0, 19.0, 13.0));
+    }
+}

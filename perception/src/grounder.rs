@@ -1,0 +1,163 @@
+//! The pipeline: frame and expectation in, percepts out.
+
+mod assemble;
+mod bases;
+
+use crate::{
+    config::GrounderConfig,
+    expected::{self, Remembered},
+    fit::{Base, Evidence},
+    hypotheses::{self, Context, Measured},
+    own, patches,
+    scan::Scan,
+    scene::Scene,
+    segments::{self, NONE},
+    support::{self, Plane, Upright},
+};
+use acm_concept::{
+    camera::RgbdFrame,
+    expectation::Expectation,
+    object::{Blindness, GroundedObject, Percepts, SupportPlane},
+    template::{SeenBy, TemplateLibrary},
+};
+use bases::Bodies;
+use glam::{DVec2, DVec3};
+use std::sync::Arc;
+
+/// Grounds frames into analytic concepts.
+///
+/// ```
+/// # use acm_concept::{camera::*, expectation::Expectation, ids::FrameId, object::Blindness, pose::Pose, template::TemplateLibrary, time::Time};
+/// # use acm_perception::{Grounder, GrounderConfig};
+/// let grounder = Grounder::new(TemplateLibrary::default().into(), GrounderConfig::default());
+/// let intrinsics = Intrinsics::from_vertical_fov(64, 48, 1.0);
+/// let header = FrameHeader { id: FrameId(0), camera: "head".into(), time: Time::ZERO, intrinsics, camera_pose: Pose::IDENTITY };
+/// let black = RgbdFrame::new(header, vec![0; 3 * 64 * 48].into(), vec![0.0; 64 * 48].into()).unwrap();
+/// let percepts = grounder.ground(&black, &Expectation::default());
+/// assert_eq!(percepts.blindness, Some(Blindness::NoDepth));
+/// ```
+#[derive(Debug, Clone)]
+pub struct Grounder {
+    library: Arc<TemplateLibrary>,
+    config: GrounderConfig,
+}
+
+impl Grounder {
+    /// A grounder that fits the templates of `library`.
+    pub fn new(library: Arc<TemplateLibrary>, config: GrounderConfig) -> Grounder {
+        Grounder { library, config }
+    }
+
+    /// Says what a frame shows. Never fails: a frame that shows nothing is answered with its
+    /// [`Blindness`] and without objects. The same frame and expectation always give the same answer.
+    ///
+    /// Poses are in the world of the frame's nominal camera pose, metres; heights are over the plane that is found,
+    /// not over a nominal one.
+    pub fn ground(&self, frame: &RgbdFrame, expectation: &Expectation) -> Percepts {
+        let blind = |blindness, depth_fraction| self.blind(frame, expectation, blindness, depth_fraction);
+        let scan = match Scan::read(frame, &self.config) {
+            Ok(scan) => scan,
+            Err((blindness, depth_fraction)) => return blind(blindness, depth_fraction),
+        };
+        let own = own::pixels(&scan, &frame.header.camera_pose, &expectation.robot, &self.config);
+        let up = frame.header.camera_pose.rotation.inverse() * DVec3::Z;
+        let upright = Upright { up, max_angle_rad: self.config.max_support_tilt_rad };
+        let Some(plane) = support::find(&scan, &own, upright, &self.config) else {
+            return blind(Blindness::NoSupport, scan.depth_fraction);
+        };
+        let scene = Scene::new(&scan, &plane, &frame.header.camera_pose, own, &self.config);
+        let remembered = Remembered::cast(&scene, &frame.header.camera_pose, expectation, &self.library);
+        let mut objects = self.objects(&scene, expectation, &remembered);
+        objects.retain(|object| object.confidence >= self.config.min_confidence);
+        objects.sort_by(|a, b| b.support.count.cmp(&a.support.count).then(a.support.runs.cmp(&b.support.runs)));
+        objects.truncate(self.config.max_objects);
+        let support = support_plane(&scene, &plane);
+        expected::hint(&remembered, &mut objects, &self.library);
+        let expected = expected::views(&scene, &remembered, &support);
+        Percepts {
+            frame: frame.header.clone(),
+            support: Some(support),
+            objects,
+            expected,
+            blindness: None,
+            depth_fraction: scan.depth_fraction,
+        }
+    }
+
+    fn blind(
+        &self,
+        frame: &RgbdFrame,
+        expectation: &Expectation,
+        blindness: Blindness,
+        depth_fraction: f64,
+    ) -> Percepts {
+        Percepts {
+            frame: frame.header.clone(),
+            support: None,
+            objects: Vec::new(),
+            expected: expected::unseen(expectation),
+            blindness: Some(blindness),
+            depth_fraction,
+        }
+    }
+
+    fn objects(&self, scene: &Scene, expectation: &Expectation, remembered: &Remembered) -> Vec<GroundedObject> {
+        let mut segments = segments::split(scene);
+        expected::split(scene, remembered, &mut segments);
+        let standing: Vec<bool> = segments.labels.iter().map(|label| *label != NONE).collect();
+        let context = |remembered| Context {
+            library: &self.library,
+            config: &self.config,
+            nouns: &expectation.nouns,
+            remembered,
+        };
+        let (mut objects, mut bodies) = (Vec::new(), Bodies::default());
+        for patch in patches::find(scene, &standing) {
+            let measured = Measured { plan: patch.plan, height_m: 0.0, base: Base::At(0.0), seen_by: SeenBy::Color };
+            let context = context(remembered.template_at(&patch.pixels));
+            let ranked = hypotheses::rank(context, &measured, &patch.evidence);
+            if let Some(object) = assemble::object(scene, context, &ranked, &patch.evidence, &patch.pixels, patch.fill)
+            {
+                bodies.add(&ranked);
+                objects.push(object);
+            }
+        }
+        let mut pieces: Vec<(f64, Vec<usize>, Evidence)> = segments
+            .pixels()
+            .into_iter()
+            .map(|pixels| {
+                let evidence = Evidence::of_segment(scene, &segments, &pixels);
+                (bases::lowest_m(scene, &pixels), pixels, evidence)
+            })
+            .collect();
+        // From below, so that what stands on another thing finds it.
+        pieces.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        for (lowest_m, pixels, evidence) in pieces {
+            let plan: Vec<DVec2> = evidence.points.iter().map(|p| p.position.truncate()).collect();
+            let base = bodies.base_under(&plan, lowest_m, &evidence);
+            let bottom = match base {
+                Base::At(height) | Base::Free(height) => height,
+            };
+            let height_m = bases::top_m(&evidence) - bottom;
+            let measured = Measured { plan, height_m, base, seen_by: SeenBy::Depth };
+            let context = context(remembered.template_at(&pixels));
+            let ranked = hypotheses::rank(context, &measured, &evidence);
+            if let Some(object) = assemble::object(scene, context, &ranked, &evidence, &pixels, 1.0) {
+                bodies.add(&ranked);
+                objects.push(object);
+            }
+        }
+        objects
+    }
+}
+
+fn support_plane(scene: &Scene, plane: &Plane) -> SupportPlane {
+    let pixels: Vec<usize> = (0..scene.grid.len()).step_by(3).filter(|&i| scene.in_plane[i]).collect();
+    let normal = scene.world.transform_vector(DVec3::Z);
+    SupportPlane {
+        normal,
+        offset_m: normal.dot(scene.world.translation),
+        residual_m: plane.residual_m,
+        appearance: scene.scan.appearance(&pixels),
+    }
+}

@@ -1,0 +1,160 @@
+//! From ranked hypotheses to a grounded object: calibrated uncertainty, canonical heading, appearance, confidence.
+
+use crate::{
+    fit::{Evidence, OutlineKind, observability},
+    hypotheses::{self, Context, Hypothesis},
+    scene::Scene,
+};
+use acm_concept::{
+    object::{GroundedObject, GroundedPart, Observability, ParameterEstimate, PixelSupport, PoseEstimate},
+    pose::Pose,
+    template::{Unit, YawSymmetry},
+};
+use glam::{DQuat, DVec3};
+
+/// A residual up to this many standard deviations counts as explained.
+const EXPLAINED: f64 = 3.0;
+/// A thing is truncated if more than this share of its outline is not its own.
+const CUT_SHARE: f64 = 0.12;
+
+/// The object that a segment's hypotheses make, or `None` if there are none.
+pub(super) fn object(
+    scene: &Scene,
+    context: Context,
+    ranked: &[Hypothesis],
+    evidence: &Evidence,
+    pixels: &[usize],
+    certainty: f64,
+) -> Option<GroundedObject> {
+    let categories = hypotheses::categories(ranked, context);
+    let (category, _) = categories.first()?;
+    let offers = |h: &&Hypothesis| {
+        let values = h.model.placement(&h.minimum.state).values;
+        h.model.template.nouns(&h.model.template.named(&values)).iter().any(|noun| noun == category)
+    };
+    let best = ranked.iter().find(offers).or(ranked.first())?;
+    let mut mask = vec![false; scene.grid.len()];
+    for &pixel in pixels {
+        mask[pixel] = scene.scan.depth[pixel] > 0.0;
+    }
+    let support = PixelSupport::from_mask(&mask, scene.grid.width)?;
+    let appearance = scene.scan.appearance(&inner(scene, &mask, pixels));
+    let part = part(scene, best, evidence, appearance)?;
+    Some(GroundedObject {
+        category: category.clone(),
+        categories,
+        parts: vec![part],
+        appearance,
+        confidence: (certainty * explained(best, evidence) * (1.0 - (-(pixels.len() as f64) / 150.0).exp()))
+            .clamp(0.0, 1.0),
+        truncated: evidence.cut_share() > CUT_SHARE,
+        expected: None,
+        support,
+    })
+}
+
+/// The pixels away from the segment's border, where colours mix; all of them if few are left.
+fn inner(scene: &Scene, mask: &[bool], pixels: &[usize]) -> Vec<usize> {
+    let deep = |&&pixel: &&usize| scene.grid.neighbours(pixel).all(|n| mask[n]);
+    let inner: Vec<usize> = pixels.iter().filter(deep).copied().collect();
+    if inner.len() * 3 > pixels.len() { inner } else { pixels.to_vec() }
+}
+
+fn part(
+    scene: &Scene,
+    hypothesis: &Hypothesis,
+    evidence: &Evidence,
+    appearance: acm_concept::color::Appearance,
+) -> Option<GroundedPart> {
+    let (model, minimum) = (&hypothesis.model, &hypothesis.minimum);
+    let template = model.template;
+    let placement = model.placement(&minimum.state);
+    let named = template.named(&placement.values);
+    let symmetry = template.yaw_symmetry(&named).ok()?;
+    let calibration = Calibration::new(scene, &scene.world.transform_point(placement.pose.translation));
+    let deviation = |index: usize| minimum.covariance[(index, index)].max(0.0).sqrt();
+    let parameters: Vec<ParameterEstimate> = observability(model, evidence, minimum)
+        .into_iter()
+        .enumerate()
+        .map(|(i, observability)| {
+            let spec = &template.parameters[i];
+            let spread = |low: f64, high: f64| (high - low).abs() / 12f64.sqrt();
+            let fitted = model.parameter_index(i).map_or(0.0, deviation);
+            let sigma = match (observability, spec.unit) {
+                (Observability::PriorOnly, _) => spread(spec.min, spec.max),
+                (Observability::Interval { low, high }, _) => calibration.length(fitted).max(spread(low, high)),
+                (Observability::Observed, Unit::M) => calibration.length(fitted),
+                (Observability::Observed, _) => calibration.angle(fitted, 0.05),
+            };
+            ParameterEstimate { name: spec.name.clone(), value: placement.values[i], sigma, observability }
+        })
+        .collect();
+    let reach =
+        model.solids(&minimum.state).iter().map(|s| s.solid.half_extents().truncate().length()).fold(0.01, f64::max);
+    let position_sigma_m = DVec3::new(
+        calibration.length(deviation(0)),
+        calibration.length(deviation(1)),
+        calibration.length(model.base_index().map_or(0.0, deviation)),
+    );
+    let yaw_sigma_rad = model.yaw_index().map_or(0.01, |i| calibration.angle(deviation(i), reach));
+    let pose = PoseEstimate { pose: world_pose(scene, &placement.pose, symmetry), position_sigma_m, yaw_sigma_rad };
+    Some(GroundedPart {
+        template: template.name.clone(),
+        parameters,
+        pose,
+        affordances: template.affordances.clone(),
+        functions: template.functions.iter().map(|f| f.name.clone()).collect(),
+        appearance,
+    })
+}
+
+/// The pose in the world, with the heading nearest to zero among the equivalent ones. A small tilt of the plane is
+/// calibration error: the part is then reported exactly upright.
+fn world_pose(scene: &Scene, pose: &Pose, symmetry: YawSymmetry) -> Pose {
+    let world = scene.world * *pose;
+    let yaw = symmetry.nearest(world.yaw(), 0.0);
+    let upright = Pose::from_yaw(world.translation, yaw);
+    let normal = scene.world.transform_vector(DVec3::Z);
+    if normal.angle_between(DVec3::Z) <= scene.config.upright_tolerance_rad {
+        return upright;
+    }
+    Pose::new(upright.translation, DQuat::from_rotation_arc(DVec3::Z, normal) * upright.rotation)
+}
+
+/// Turns the standard deviations of a fit into honest ones: sigma^2 = (k sigma_fit)^2 + floor^2 + (share z)^2.
+struct Calibration {
+    factor: f64,
+    systematic_m: f64,
+}
+
+impl Calibration {
+    fn new(scene: &Scene, position: &DVec3) -> Calibration {
+        let camera = (scene.world * scene.camera).inverse();
+        let distance = camera.transform_point(*position).z.max(0.0);
+        Calibration {
+            factor: scene.config.sigma_factor,
+            systematic_m: scene.config.sigma_floor_m.hypot(scene.config.sigma_range * distance),
+        }
+    }
+    fn length(&self, fitted: f64) -> f64 {
+        (self.factor * fitted).hypot(self.systematic_m)
+    }
+    /// An angle over a lever of `reach_m`.
+    fn angle(&self, fitted: f64, reach_m: f64) -> f64 {
+        (self.factor * fitted).hypot(0.5 * self.systematic_m / reach_m.max(0.005)).min(std::f64::consts::PI)
+    }
+}
+
+/// Share of the evidence that the fit explains: surface points, and outline points that are the thing's own.
+fn explained(hypothesis: &Hypothesis, evidence: &Evidence) -> f64 {
+    let mut residuals = Vec::new();
+    hypothesis.model.residuals(&hypothesis.minimum.state, evidence, &mut residuals);
+    let (points, outline) = residuals.split_at(evidence.points.len().min(residuals.len()));
+    let share = |good: usize, all: usize| if all == 0 { 1.0 } else { good as f64 / all as f64 };
+    let fits = |r: &f64| r.abs() < EXPLAINED;
+    let on_surface = share(points.iter().filter(|r| fits(r)).count(), points.len());
+    let own: Vec<f64> =
+        outline.iter().zip(&evidence.outline).filter(|(_, p)| p.kind == OutlineKind::Own).map(|(r, _)| *r).collect();
+    let on_outline = share(own.iter().filter(|r| fits(r)).count(), own.len());
+    on_surface * (0.4 + 0.6 * on_outline)
+}

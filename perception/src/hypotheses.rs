@@ -1,0 +1,167 @@
+//! Which template a segment is: every template is fitted and the fits are ranked by penalised likelihood, the
+//! template's prior and the words of the instruction.
+
+use crate::{
+    config::GrounderConfig,
+    fit::{Base, Evidence, Minimum, Model, cost, minimise, rough_cost},
+    measure::{self, Rectangle},
+};
+use acm_concept::template::{SeenBy, Template, TemplateLibrary};
+use glam::DVec2;
+use nalgebra::DMatrix;
+use std::collections::BTreeMap;
+
+/// What is measured of a segment, and where it stands.
+#[derive(Debug, Clone)]
+pub(crate) struct Measured {
+    /// Points seen from above, support frame.
+    pub plan: Vec<DVec2>,
+    /// Height of the top over the base, metres.
+    pub height_m: f64,
+    pub base: Base,
+    pub seen_by: SeenBy,
+}
+
+/// What raises or lowers the odds of templates besides geometry.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Context<'a> {
+    pub library: &'a TemplateLibrary,
+    pub config: &'a GrounderConfig,
+    /// Nouns of the instruction.
+    pub nouns: &'a [String],
+    /// Template under which memory knows what it expects here.
+    pub remembered: Option<&'a str>,
+}
+
+/// One template with its fit.
+#[derive(Debug, Clone)]
+pub(crate) struct Hypothesis<'a> {
+    pub model: Model<'a>,
+    pub minimum: Minimum,
+    /// Posterior probability among the templates that were tried.
+    pub probability: f64,
+}
+
+/// Headings that are tried as starts: a quarter turn in steps of 7.5 degrees.
+const YAW_STEP: f64 = std::f64::consts::PI / 24.0;
+/// Starts that are fitted of each template.
+const STARTS: usize = 2;
+
+/// All templates that can explain a segment, the most probable first.
+pub(crate) fn rank<'a>(context: Context<'a>, measured: &Measured, evidence: &Evidence) -> Vec<Hypothesis<'a>> {
+    let rectangles = measure::rectangles(&measured.plan, YAW_STEP, 0.01);
+    let circle = measure::circle(&measured.plan);
+    let templates = context.library.iter().filter(|template| template.seen_by == measured.seen_by);
+    let mut scored: Vec<(f64, Hypothesis<'a>)> = templates
+        .filter_map(|template| {
+            let (model, minimum) = best_fit(template, measured, &rectangles, circle, evidence)?;
+            let score = score(context, &model, &minimum, evidence);
+            Some((score, Hypothesis { model, minimum, probability: 0.0 }))
+        })
+        .collect();
+    scored.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let Some(best) = scored.first().map(|(score, _)| *score) else { return Vec::new() };
+    // Where even the best fits badly the likelihoods of all are less sure than they look.
+    let misfit = scored.first().map_or(1.0, |(_, h)| h.minimum.cost / (0.5 * evidence.independent()).max(1.0));
+    let temperature = misfit.max(1.0);
+    let odds: Vec<f64> = scored.iter().map(|(score, _)| ((score - best) / temperature).exp()).collect();
+    let total: f64 = odds.iter().sum();
+    scored.into_iter().zip(odds).map(|((_, h), odd)| Hypothesis { probability: odd / total, ..h }).collect()
+}
+
+fn best_fit<'a>(
+    template: &'a Template,
+    measured: &Measured,
+    rectangles: &[Rectangle],
+    circle: Option<(DVec2, f64)>,
+    evidence: &Evidence,
+) -> Option<(Model<'a>, Minimum)> {
+    let smallest = measure::smallest(rectangles)?;
+    let fallback = (smallest.centre, 0.25 * (smallest.length + smallest.width));
+    let (centre, radius) =
+        circle.filter(|(_, r)| *r < smallest.length && *r > 0.2 * smallest.length).unwrap_or(fallback);
+    let start_at = |rectangle: &Rectangle| {
+        let initial =
+            template.initial_values([rectangle.length, rectangle.width, measured.height_m.max(0.0), radius]).ok()?;
+        let model = Model::new(template, initial, measured.base)?;
+        let at = if model.turns { rectangle.centre } else { centre };
+        let start = model.start(at, rectangle.yaw);
+        Some((rough_cost(&model, evidence, &start), model, start))
+    };
+    let mut starts: Vec<_> = rectangles.iter().filter_map(start_at).collect();
+    starts.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let turns = starts.first().is_some_and(|(_, model, _)| model.turns);
+    let fits = starts.into_iter().take(if turns { STARTS } else { 1 }).filter_map(|(_, model, start)| {
+        let minimum = minimise(&model, evidence, &start);
+        let minimum = canonical(&model, minimum, evidence)?;
+        Some((model, minimum))
+    });
+    fits.min_by(|a, b| a.1.cost.total_cmp(&b.1.cost))
+}
+
+/// The same solids under parameter values that the template admits: as they are, or with two parameters exchanged
+/// and a quarter turn (a box's length and width). `None` if there are no such values.
+fn canonical(model: &Model, minimum: Minimum, evidence: &Evidence) -> Option<Minimum> {
+    let template = model.template;
+    let admitted = |state: &[f64]| template.admits(&template.named(&model.placement(state).values));
+    if admitted(&minimum.state) {
+        return Some(minimum);
+    }
+    let yaw = model.yaw_index()?;
+    let count = template.parameters.len();
+    let pairs = (0..count).flat_map(|i| (i + 1..count).map(move |j| (i, j)));
+    for (i, j) in pairs.filter(|&(i, j)| template.parameters[i].unit == template.parameters[j].unit) {
+        let (Some(a), Some(b)) = (model.parameter_index(i), model.parameter_index(j)) else { continue };
+        let mut state = minimum.state.clone();
+        state.swap(a, b);
+        state[yaw] += std::f64::consts::FRAC_PI_2;
+        let same = (cost(model, evidence, &state) - minimum.cost).abs() < 1e-3 * (1.0 + minimum.cost.abs());
+        if same && admitted(&state) {
+            let mut covariance: DMatrix<f64> = minimum.covariance;
+            covariance.swap_rows(a, b);
+            covariance.swap_columns(a, b);
+            return Some(Minimum { state, covariance, cost: minimum.cost });
+        }
+    }
+    None
+}
+
+fn score(context: Context, model: &Model, minimum: &Minimum, evidence: &Evidence) -> f64 {
+    let template = model.template;
+    let values = model.placement(&minimum.state).values;
+    let named = template.named(&values);
+    let penalty = 0.5 * minimum.state.len() as f64 * evidence.independent().max(2.0).ln();
+    let spoken_of = template.nouns(&named).iter().any(|noun| context.nouns.iter().any(|said| said == noun));
+    let mut score = -minimum.cost - penalty + template.prior.max(1e-9).ln();
+    if spoken_of {
+        score += context.config.noun_boost.ln();
+    }
+    if context.remembered == Some(template.name.as_str()) {
+        score += context.config.memory_boost.ln();
+    }
+    score
+}
+
+/// Probabilities of the nouns under which the hypotheses are spoken of, best first.
+///
+/// The first nouns of a template are its most specific ones and count twice the next; a noun of the instruction is
+/// preferred over its neighbours.
+pub(crate) fn categories(hypotheses: &[Hypothesis], context: Context) -> Vec<(String, f64)> {
+    let mut nouns: BTreeMap<&str, f64> = BTreeMap::new();
+    for hypothesis in hypotheses {
+        let template = hypothesis.model.template;
+        let values = hypothesis.model.placement(&hypothesis.minimum.state).values;
+        let fitting = template.nouns(&template.named(&values));
+        let weight = |(place, noun): (usize, &&str)| {
+            let said = context.nouns.iter().any(|said| said == noun);
+            0.5f64.powi(place as i32) * if said { context.config.noun_boost } else { 1.0 }
+        };
+        let total: f64 = fitting.iter().enumerate().map(weight).sum();
+        for (place, noun) in fitting.iter().enumerate() {
+            *nouns.entry(noun).or_insert(0.0) += hypothesis.probability * weight((place, noun)) / total;
+        }
+    }
+    let mut categories: Vec<(String, f64)> = nouns.into_iter().map(|(noun, p)| (noun.to_string(), p)).collect();
+    categories.sort_by(|a, b| b.1.total_cmp(&a.1));
+    categories
+}

@@ -1,0 +1,234 @@
+//! Flat patches: areas of the plane that differ from it by colour alone.
+
+use crate::{
+    fit::{Evidence, OutlineKind, OutlinePoint},
+    measure::{self, Rectangle},
+    scene::Scene,
+};
+use glam::DVec2;
+
+/// A patch of the plane with a colour of its own.
+pub(crate) struct Patch {
+    /// Its visible pixels, ascending.
+    pub pixels: Vec<usize>,
+    /// Where the rays of those pixels meet the plane, thinned out.
+    pub plan: Vec<DVec2>,
+    pub evidence: Evidence,
+    /// Share of its rectangle's visible area that has its colour, 0-1.
+    pub fill: f64,
+}
+
+/// How a pixel counts in the search for patches.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Ground {
+    /// The bare surface.
+    Bare,
+    /// A different colour in the plane.
+    Tinted,
+    /// Covered by something that stands there, by the robot, or without depth.
+    Unknown,
+}
+
+pub(crate) fn find(scene: &Scene, standing: &[bool]) -> Vec<Patch> {
+    let Some(surface) = SurfaceTint::measure(scene) else { return Vec::new() };
+    let covered = scene.grid.dilate(standing, 4);
+    let ground: Vec<Ground> = (0..scene.grid.len()).map(|i| classify(scene, &surface, &covered, i)).collect();
+    let tinted: Vec<bool> = ground.iter().map(|g| *g == Ground::Tinted).collect();
+    let firm = scene.grid.dilate(&scene.grid.erode(&tinted, 1), 1);
+    let mask: Vec<bool> = (0..tinted.len()).map(|i| tinted[i] && firm[i]).collect();
+    let alike = |a: usize, b: usize| tint_distance(scene.scan.tint(a), scene.scan.tint(b)) < 14.0;
+    let (labels, sizes) = scene.grid.components(&mask, alike);
+    let mut pieces: Vec<Vec<usize>> = vec![Vec::new(); sizes.len()];
+    for (index, &label) in labels.iter().enumerate() {
+        if sizes.get(label as usize).is_some_and(|size| *size >= scene.config.min_segment_px / 2) {
+            pieces[label as usize].push(index);
+        }
+    }
+    pieces.retain(|pixels| !pixels.is_empty());
+    join_pieces(scene, &ground, &mut pieces);
+    pieces.into_iter().filter_map(|pixels| patch(scene, &ground, pixels)).collect()
+}
+
+fn tint_distance(a: [f32; 2], b: [f32; 2]) -> f32 {
+    (a[0] - b[0]).hypot(a[1] - b[1])
+}
+
+fn classify(scene: &Scene, surface: &SurfaceTint, covered: &[bool], index: usize) -> Ground {
+    let dark = scene.scan.lab[index][0] < 8.0;
+    if covered[index] || scene.own[index] || !scene.in_plane[index] || dark {
+        return Ground::Unknown;
+    }
+    let distance = tint_distance(scene.scan.tint(index), surface.at(scene, index));
+    if distance > scene.config.patch_contrast { Ground::Tinted } else { Ground::Bare }
+}
+
+/// The bare surface's tint as a plane over the image: white balance and light change slowly across it.
+struct SurfaceTint {
+    /// For a and b: constant, per column, per row (both from -1 to 1).
+    coefficients: [nalgebra::Vector3<f32>; 2],
+}
+
+impl SurfaceTint {
+    fn measure(scene: &Scene) -> Option<SurfaceTint> {
+        let pixels: Vec<usize> = (0..scene.grid.len()).step_by(5).filter(|&i| scene.in_plane[i]).collect();
+        let mode = mode(&pixels.iter().map(|&i| scene.scan.tint(i)).collect::<Vec<_>>())?;
+        let constant = |value: f32| nalgebra::Vector3::new(value, 0.0, 0.0);
+        let mut tint = SurfaceTint { coefficients: [constant(mode[0]), constant(mode[1])] };
+        for _ in 0..3 {
+            let (mut matrix, mut right) = (nalgebra::Matrix3::zeros(), [nalgebra::Vector3::zeros(); 2]);
+            for &pixel in &pixels {
+                let value = scene.scan.tint(pixel);
+                if tint_distance(value, tint.at(scene, pixel)) > 0.6 * scene.config.patch_contrast {
+                    continue;
+                }
+                let row = place(scene, pixel);
+                matrix += row * row.transpose();
+                right[0] += row * value[0];
+                right[1] += row * value[1];
+            }
+            let inverse = (matrix + nalgebra::Matrix3::identity() * 10.0).try_inverse()?;
+            let pull = |c: f32, sum| inverse * (sum + constant(10.0 * c));
+            tint.coefficients = [pull(mode[0], right[0]), pull(mode[1], right[1])];
+        }
+        Some(tint)
+    }
+    fn at(&self, scene: &Scene, pixel: usize) -> [f32; 2] {
+        let row = place(scene, pixel);
+        [self.coefficients[0].dot(&row), self.coefficients[1].dot(&row)]
+    }
+}
+
+fn place(scene: &Scene, pixel: usize) -> nalgebra::Vector3<f32> {
+    let across = scene.grid.column(pixel) as f32 / scene.grid.width as f32;
+    let down = scene.grid.row(pixel) as f32 / scene.grid.height as f32;
+    nalgebra::Vector3::new(1.0, 2.0 * across - 1.0, 2.0 * down - 1.0)
+}
+
+/// The most frequent tint: the fullest cell of a histogram, refined by the mean round it.
+fn mode(tints: &[[f32; 2]]) -> Option<[f32; 2]> {
+    const CELL: f32 = 4.0;
+    const HALF: i32 = 40;
+    let cell = |value: f32| (value / CELL).round().clamp(-HALF as f32, HALF as f32) as i32 + HALF;
+    let side = 2 * HALF as usize + 1;
+    let mut counts = vec![0u32; side * side];
+    for tint in tints {
+        counts[cell(tint[0]) as usize * side + cell(tint[1]) as usize] += 1;
+    }
+    let fullest = (0..counts.len()).max_by_key(|&i| (counts[i], std::cmp::Reverse(i)))?;
+    let middle = [(fullest / side) as f32, (fullest % side) as f32].map(|at| (at - HALF as f32) * CELL);
+    let near: Vec<&[f32; 2]> = tints.iter().filter(|t| tint_distance(**t, middle) < 2.0 * CELL).collect();
+    let count = near.len() as f32;
+    (count > 0.0).then(|| [0, 1].map(|axis| near.iter().map(|t| t[axis]).sum::<f32>() / count))
+}
+
+/// Where the rays of some of the pixels meet the plane.
+fn plan(scene: &Scene, pixels: &[usize]) -> Vec<DVec2> {
+    let step = (pixels.len() / 500).max(1);
+    let at = |&pixel: &usize| DVec2::new(scene.grid.column(pixel) as f64, scene.grid.row(pixel) as f64);
+    pixels.iter().step_by(step).filter_map(|pixel| scene.foot_of_ray(at(pixel))).collect()
+}
+
+fn rectangle(plan: &[DVec2]) -> Option<Rectangle> {
+    measure::smallest(&measure::rectangles(plan, std::f64::consts::PI / 60.0, 0.003))
+}
+
+/// Joins pieces of one patch that something standing on it, or the robot, cuts apart: pieces of one colour whose
+/// common rectangle is as full as their own.
+fn join_pieces(scene: &Scene, ground: &[Ground], pieces: &mut Vec<Vec<usize>>) {
+    let mean_tint = |pixels: &[usize]| {
+        let sum = pixels.iter().map(|&i| scene.scan.tint(i)).fold([0.0f32; 2], |s, t| [s[0] + t[0], s[1] + t[1]]);
+        sum.map(|total| total / pixels.len() as f32)
+    };
+    let mut first = 0;
+    while first < pieces.len() {
+        let mut second = first + 1;
+        while second < pieces.len() {
+            let alike = tint_distance(mean_tint(&pieces[first]), mean_tint(&pieces[second])) < 14.0;
+            let joined: Vec<usize> = if alike {
+                let mut both: Vec<usize> = pieces[first].iter().chain(&pieces[second]).copied().collect();
+                both.sort_unstable();
+                both
+            } else {
+                Vec::new()
+            };
+            let fits = alike
+                && rectangle(&plan(scene, &joined))
+                    .is_some_and(|r| r.length < 0.45 && fill(scene, ground, &r, &joined) > 0.9);
+            if fits {
+                pieces[first] = joined;
+                pieces.remove(second);
+                second = first + 1;
+            } else {
+                second += 1;
+            }
+        }
+        first += 1;
+    }
+}
+
+/// Share of a rectangle's visible area that has the patch's colour.
+fn fill(scene: &Scene, ground: &[Ground], rectangle: &Rectangle, pixels: &[usize]) -> f64 {
+    const CELLS: usize = 24;
+    let axis = DVec2::from_angle(rectangle.yaw);
+    let (mut inside, mut known) = (0usize, 0usize);
+    for i in 0..CELLS * CELLS {
+        let (u, v) = ((i % CELLS) as f64 + 0.5, (i / CELLS) as f64 + 0.5);
+        let local =
+            DVec2::new(u / CELLS as f64 - 0.5, v / CELLS as f64 - 0.5) * DVec2::new(rectangle.length, rectangle.width);
+        let at = rectangle.centre + axis.rotate(local);
+        let Some(pixel) = scene.project(at.extend(0.0)).filter(|p| scene.scan.intrinsics.contains(*p)) else {
+            continue;
+        };
+        let index = scene.grid.index(pixel.x.round().max(0.0) as usize, pixel.y.round().max(0.0) as usize);
+        match ground[index] {
+            Ground::Unknown => {}
+            Ground::Bare => known += 1,
+            Ground::Tinted => {
+                known += 1;
+                inside += usize::from(pixels.binary_search(&index).is_ok());
+            }
+        }
+    }
+    if known == 0 { 0.0 } else { inside as f64 / known as f64 }
+}
+
+fn patch(scene: &Scene, ground: &[Ground], pixels: Vec<usize>) -> Option<Patch> {
+    let plan = plan(scene, &pixels);
+    let rectangle = rectangle(&plan)?;
+    let fill = fill(scene, ground, &rectangle, &pixels);
+    if pixels.len() < scene.config.min_segment_px || rectangle.width < scene.config.min_patch_m || fill < 0.8 {
+        return None;
+    }
+    let outline = outline(scene, ground, &pixels);
+    let own = outline.iter().filter(|point| point.kind == OutlineKind::Own).count();
+    if own * 3 < outline.len() {
+        return None;
+    }
+    let evidence = Evidence::new(scene, Vec::new(), 0, outline);
+    Some(Patch { pixels, plan, evidence, fill })
+}
+
+fn outline(scene: &Scene, ground: &[Ground], pixels: &[usize]) -> Vec<OutlinePoint> {
+    let mut inside = vec![false; scene.grid.len()];
+    for &pixel in pixels {
+        inside[pixel] = true;
+    }
+    let mut points = Vec::new();
+    for &pixel in pixels {
+        for (dx, dy) in [(1isize, 0isize), (0, 1), (-1, 0), (0, -1)] {
+            let next = scene.grid.offset(pixel, dx, dy);
+            if next.is_some_and(|n| inside[n]) {
+                continue;
+            }
+            let kind = match next.map(|n| ground[n]) {
+                Some(Ground::Bare) => OutlineKind::Own,
+                // Another colour in the plane: an edge of this patch all the same.
+                Some(Ground::Tinted) => OutlineKind::Own,
+                Some(Ground::Unknown) | None => OutlineKind::Cut,
+            };
+            let at = DVec2::new(scene.grid.column(pixel) as f64, scene.grid.row(pixel) as f64);
+            points.push(OutlinePoint { pixel: at + DVec2::new(dx as f64, dy as f64) * 0.5, sigma_px: 1.0, kind });
+        }
+    }
+    points
+}

@@ -1,0 +1,193 @@
+//! Ingest: which depths are believed, a smoothed copy of them, and the colour image in CIELAB.
+
+use crate::{config::GrounderConfig, grid::Grid};
+use acm_concept::{
+    camera::{Intrinsics, MAX_PIXELS, RgbdFrame},
+    color::{Appearance, Lab},
+    object::Blindness,
+};
+use glam::DVec3;
+use std::sync::OnceLock;
+
+/// A frame as the pipeline reads it. All planes have the shape of `grid`.
+pub(crate) struct Scan {
+    pub grid: Grid,
+    pub intrinsics: Intrinsics,
+    /// Depth in metres, 0 where none is believed.
+    pub depth: Vec<f32>,
+    /// Depth averaged over neighbours on the same surface, lone holes filled; 0 elsewhere.
+    pub smooth: Vec<f32>,
+    /// CIELAB of every pixel.
+    pub lab: Vec<[f32; 3]>,
+    /// Share of the pixels with a depth.
+    pub depth_fraction: f64,
+}
+
+impl Scan {
+    /// Reads a frame, or says why it shows nothing.
+    pub fn read(frame: &RgbdFrame, config: &GrounderConfig) -> Result<Scan, (Blindness, f64)> {
+        let intrinsics = frame.header.intrinsics;
+        let grid = Grid { width: intrinsics.width as usize, height: intrinsics.height as usize };
+        let complete = frame.depth.len() == grid.len() && frame.color.len() == 3 * grid.len();
+        if !complete
+            || grid.width < 16
+            || grid.height < 16
+            || grid.len() > MAX_PIXELS
+            || !frame.header.camera_pose.is_valid()
+        {
+            return Err((Blindness::NoDepth, 0.0));
+        }
+        let believed = |&z: &f32| if z >= config.depth_min_m && z <= config.depth_max_m { z } else { 0.0 };
+        let depth: Vec<f32> = frame.depth.iter().map(believed).collect();
+        let depth_fraction = depth.iter().filter(|z| **z > 0.0).count() as f64 / grid.len() as f64;
+        if depth_fraction < config.min_depth_fraction {
+            return Err((Blindness::NoDepth, depth_fraction));
+        }
+        if is_black(&frame.color, config.min_brightness) {
+            return Err((Blindness::NoColor, depth_fraction));
+        }
+        let smooth = smooth(grid, &depth, config);
+        let lab = frame.color.chunks_exact(3).map(|p| to_lab([p[0], p[1], p[2]])).collect();
+        Ok(Scan { grid, intrinsics, depth, smooth, lab, depth_fraction })
+    }
+
+    /// The viewing ray of a pixel in the camera frame, z = 1.
+    pub fn ray(&self, index: usize) -> DVec3 {
+        self.intrinsics.ray(self.grid.column(index) as f64, self.grid.row(index) as f64)
+    }
+    /// Colour with the strength of the light taken out: a and b over L + 16, which all scale with the cube root of
+    /// the illumination, times 80 so that the numbers compare with CIELAB's at medium lightness.
+    pub fn tint(&self, index: usize) -> [f32; 2] {
+        let [l, a, b] = self.lab[index];
+        [80.0 * a / (l + 16.0), 80.0 * b / (l + 16.0)]
+    }
+    /// Mean colour and spread of some pixels.
+    pub fn appearance(&self, pixels: &[usize]) -> Appearance {
+        let count = pixels.len().max(1) as f64;
+        let mut sum = [0f64; 3];
+        for &pixel in pixels {
+            for (total, value) in sum.iter_mut().zip(self.lab[pixel]) {
+                *total += f64::from(value);
+            }
+        }
+        let mean = sum.map(|total| total / count);
+        let distance2 = |&pixel: &usize| -> f64 {
+            self.lab[pixel].iter().zip(mean).map(|(value, m)| (f64::from(*value) - m).powi(2)).sum()
+        };
+        let variance = pixels.iter().map(distance2).sum::<f64>() / count;
+        Appearance { mean: Lab { l: mean[0], a: mean[1], b: mean[2] }, spread: variance.sqrt() }
+    }
+}
+
+/// Whether even the 95th percentile of the brightness is below the limit.
+fn is_black(color: &[u8], limit: u8) -> bool {
+    let (mut bright, mut total) = (0usize, 0usize);
+    for pixel in color.chunks_exact(3).step_by(7) {
+        total += 1;
+        bright += usize::from(pixel.iter().copied().max().unwrap_or(0) >= limit);
+    }
+    bright * 20 < total
+}
+
+/// Averages each depth with those of its 5x5 neighbours that lie on the same surface; fills lone holes.
+fn smooth(grid: Grid, depth: &[f32], config: &GrounderConfig) -> Vec<f32> {
+    let mut out = vec![0f32; depth.len()];
+    let gate: Vec<f32> = depth.iter().map(|&z| 0.006 + 3.0 * config.depth_sigma_m(f64::from(z)) as f32).collect();
+    for row in 0..grid.height {
+        let rows = row.saturating_sub(2)..=(row + 2).min(grid.height - 1);
+        for column in 0..grid.width {
+            let at = grid.index(column, row);
+            let (from, to) = (column.saturating_sub(2), (column + 2).min(grid.width - 1));
+            let (mut centre, mut gate_m) = (depth[at], gate[at]);
+            if centre == 0.0 {
+                let Some((median, near)) = hole(grid, depth, column, row) else { continue };
+                (centre, gate_m) = (median, near);
+            }
+            let (mut sum, mut count) = (0f32, 0f32);
+            for r in rows.clone() {
+                for &z in &depth[r * grid.width + from..=r * grid.width + to] {
+                    if (z - centre).abs() < gate_m && z > 0.0 {
+                        sum += z;
+                        count += 1.0;
+                    }
+                }
+            }
+            out[at] = if count > 0.0 { sum / count } else { centre };
+        }
+    }
+    out
+}
+
+/// A depth for a hole whose direct surroundings are mostly measured and of one surface.
+fn hole(grid: Grid, depth: &[f32], column: usize, row: usize) -> Option<(f32, f32)> {
+    if column == 0 || row == 0 || column + 1 >= grid.width || row + 1 >= grid.height {
+        return None;
+    }
+    let (mut low, mut high, mut sum, mut count) = (f32::MAX, 0f32, 0f32, 0f32);
+    for r in row - 1..=row + 1 {
+        for &z in depth[r * grid.width + column - 1..=r * grid.width + column + 1].iter().filter(|z| **z > 0.0) {
+            (low, high, sum, count) = (low.min(z), high.max(z), sum + z, count + 1.0);
+        }
+    }
+    (count >= 5.0 && high - low < 0.012 * high).then(|| (sum / count, 0.02 * high))
+}
+
+/// [`Lab::from_srgb`] by tables: a frame has too many pixels for powers and roots.
+fn to_lab(rgb: [u8; 3]) -> [f32; 3] {
+    const STEPS: usize = 4096;
+    static TABLES: OnceLock<(Vec<f32>, Vec<f32>)> = OnceLock::new();
+    let (linear, root) = TABLES.get_or_init(|| {
+        let linear = (0..256)
+            .map(|i| i as f64 / 255.0)
+            .map(|c| (if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }) as f32);
+        let root = (0..=STEPS + 1)
+            .map(|i| i as f64 / STEPS as f64)
+            .map(|t| (if t > 216.0 / 24389.0 { t.cbrt() } else { (24389.0 / 27.0 * t + 16.0) / 116.0 }) as f32);
+        (linear.collect(), root.collect())
+    });
+    let [r, g, b] = rgb.map(|channel| linear[usize::from(channel)]);
+    let f = |t: f32| {
+        let at = t.clamp(0.0, 1.0) * STEPS as f32;
+        let low = at as usize;
+        root[low] + (root[low + 1] - root[low]) * (at - low as f32)
+    };
+    let fx = f((0.412_456_4 * r + 0.357_576_1 * g + 0.180_437_5 * b) / 0.95047);
+    let fy = f(0.212_672_9 * r + 0.715_152_2 * g + 0.072_175 * b);
+    let fz = f((0.019_333_9 * r + 0.119_192 * g + 0.950_304_1 * b) / 1.08883);
+    [116.0 * fy - 16.0, 500.0 * (fx - fy), 200.0 * (fy - fz)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_tables_agree_with_the_exact_colour() {
+        for rgb in [[0, 0, 0], [255, 255, 255], [10, 200, 30], [1, 2, 3], [250, 10, 128], [90, 90, 91]] {
+            let (exact, [l, a, b]) = (Lab::from_srgb(rgb), to_lab(rgb));
+            let near = Lab { l: f64::from(l), a: f64::from(a), b: f64::from(b) };
+            assert!(exact.distance(&near) < 0.15, "{rgb:?}: {exact:?} {near:?}");
+        }
+    }
+
+    #[test]
+    fn tint_does_not_change_with_the_light() {
+        // Linear light halved: sRGB 180 -> 132, 90 -> 64, 60 -> 41.
+        let tint = |rgb| {
+            let [l, a, b] = to_lab(rgb);
+            [80.0 * a / (l + 16.0), 80.0 * b / (l + 16.0)]
+        };
+        let (full, half) = (tint([180, 90, 60]), tint([132, 64, 41]));
+        assert!((full[0] - half[0]).hypot(full[1] - half[1]) < 1.5, "{full:?} {half:?}");
+    }
+
+    #[test]
+    fn a_lone_hole_is_filled_and_an_edge_is_kept() {
+        let grid = Grid { width: 16, height: 16 };
+        let mut depth: Vec<f32> = (0..256).map(|i| if i % 16 < 8 { 0.8 } else { 1.2 }).collect();
+        depth[5 * 16 + 4] = 0.0;
+        let smooth = smooth(grid, &depth, &GrounderConfig::default());
+        assert!((smooth[5 * 16 + 4] - 0.8).abs() < 1e-6);
+        assert!((smooth[5 * 16 + 7] - 0.8).abs() < 1e-6 && (smooth[5 * 16 + 8] - 1.2).abs() < 1e-6);
+    }
+}

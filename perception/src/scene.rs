@@ -1,0 +1,218 @@
+//! The frame seen from its support: points, heights and normals in a frame whose z = 0 is the plane.
+
+use crate::{config::GrounderConfig, grid::Grid, scan::Scan, support::Plane};
+use acm_concept::pose::Pose;
+use glam::{DQuat, DVec2, DVec3, Vec3};
+
+/// A frame with its support plane. The *support frame* is the world turned by the plane's small tilt and moved so
+/// that z is the height above the plane.
+pub(crate) struct Scene<'a> {
+    pub scan: &'a Scan,
+    pub config: &'a GrounderConfig,
+    pub grid: Grid,
+    /// Pose of the camera in the support frame.
+    pub camera: Pose,
+    /// Pose of the support frame in the world.
+    pub world: Pose,
+    /// How noisy this frame is compared with the sensor model, after smoothing.
+    pub noise_ratio: f64,
+    /// Point of every pixel in the support frame, from the smoothed depth; NaN where there is none.
+    pub point: Vec<Vec3>,
+    /// Pixels that belong to the robot itself.
+    pub own: Vec<bool>,
+    /// Pixels on the plane and within its extent.
+    pub in_plane: Vec<bool>,
+    /// Pixels of what stands on the plane.
+    pub rising: Vec<bool>,
+    /// Outline of the surface, counter-clockwise, support frame x and y.
+    pub outline: Vec<DVec2>,
+}
+
+impl<'a> Scene<'a> {
+    pub fn new(
+        scan: &'a Scan,
+        plane: &Plane,
+        camera_pose: &Pose,
+        own: Vec<bool>,
+        config: &'a GrounderConfig,
+    ) -> Scene<'a> {
+        let normal = camera_pose.transform_vector(plane.normal);
+        let offset = plane.offset + normal.dot(camera_pose.translation);
+        let world = Pose::new(normal * offset, DQuat::from_rotation_arc(DVec3::Z, normal));
+        let camera = world.inverse() * *camera_pose;
+        let point = points(scan, &camera);
+        let mut scene = Scene {
+            scan,
+            config,
+            grid: scan.grid,
+            camera,
+            world,
+            noise_ratio: plane.noise_ratio.clamp(0.25, 2.0),
+            point,
+            own,
+            in_plane: Vec::new(),
+            rising: Vec::new(),
+            outline: Vec::new(),
+        };
+        scene.find_surface();
+        scene.find_rising();
+        scene
+    }
+
+    /// Height noise of the smoothed depth at a pixel, metres.
+    pub fn height_sigma_m(&self, pixel: usize) -> f32 {
+        let z = f64::from(self.scan.smooth[pixel]);
+        let down = self.camera.transform_vector(self.scan.ray(pixel).normalize()).z.abs();
+        (self.noise_ratio * self.config.depth_sigma_m(z) * down) as f32
+    }
+    /// Height above which a pixel stands on the plane rather than in it.
+    pub fn height_limit_m(&self, pixel: usize) -> f32 {
+        self.config.min_height_m.max(3.0 * self.height_sigma_m(pixel))
+    }
+    /// Where the viewing ray of an image point meets the plane, support frame x and y.
+    pub fn foot_of_ray(&self, pixel: DVec2) -> Option<DVec2> {
+        let direction = self.camera.transform_vector(self.scan.intrinsics.ray(pixel.x, pixel.y));
+        let along = -self.camera.translation.z / direction.z;
+        (direction.z < -1e-6 && along > 0.0).then(|| (self.camera.translation + direction * along).truncate())
+    }
+    /// Image coordinates of a point of the support frame.
+    pub fn project(&self, point: DVec3) -> Option<DVec2> {
+        self.scan.intrinsics.project(self.camera.inverse().transform_point(point))
+    }
+    /// Measured (not smoothed) point of a pixel in the support frame.
+    pub fn measured(&self, pixel: usize) -> Option<DVec3> {
+        let depth = f64::from(self.scan.depth[pixel]);
+        (depth > 0.0).then(|| self.camera.transform_point(self.scan.ray(pixel) * depth))
+    }
+    pub fn is_known(&self, pixel: usize) -> bool {
+        !self.point[pixel].z.is_nan()
+    }
+
+    fn find_surface(&mut self) {
+        let flat = |i: usize| !self.own[i] && self.is_known(i) && self.point[i].z.abs() <= self.height_limit_m(i);
+        let mask: Vec<bool> = (0..self.grid.len()).map(flat).collect();
+        // Opened against specks on walls and floors behind, closed over lines of holes.
+        let solid = self.grid.dilate(&self.grid.erode(&mask, 1), 3);
+        let (labels, sizes) = self.grid.components(&solid, |_, _| true);
+        let largest = (0..sizes.len()).max_by_key(|&l| (sizes[l], std::cmp::Reverse(l)));
+        self.in_plane = (0..mask.len()).map(|i| mask[i] && Some(labels[i] as usize) == largest).collect();
+        let feet: Vec<DVec2> = (0..mask.len())
+            .step_by(3)
+            .filter(|&i| self.in_plane[i])
+            .map(|i| self.point[i].truncate().as_dvec2())
+            .collect();
+        self.outline = convex_hull(feet);
+    }
+
+    fn find_rising(&mut self) {
+        let rises = |i: usize| {
+            let point = self.point[i];
+            !self.own[i]
+                && self.is_known(i)
+                && point.z > self.height_limit_m(i)
+                && point.z < self.config.max_height_m
+                && self.stands_inside(point.as_dvec3())
+        };
+        self.rising = (0..self.grid.len()).map(rises).collect();
+    }
+
+    /// Whether the foot of a point lies on the surface. Feet that the image does not show get some leave.
+    fn stands_inside(&self, point: DVec3) -> bool {
+        let outside = distance_outside(&self.outline, point.truncate());
+        if outside <= 0.01 {
+            return true;
+        }
+        let seen = self.project(point.with_z(0.0)).is_some_and(|pixel| self.scan.intrinsics.contains(pixel));
+        !seen && outside < 0.12
+    }
+}
+
+fn points(scan: &Scan, camera: &Pose) -> Vec<Vec3> {
+    let axes = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| camera.transform_vector(axis));
+    let mut points = Vec::with_capacity(scan.grid.len());
+    for row in 0..scan.grid.height {
+        let y = (row as f64 - scan.intrinsics.cy) / scan.intrinsics.fy;
+        for column in 0..scan.grid.width {
+            let depth = f64::from(scan.smooth[scan.grid.index(column, row)]);
+            if depth <= 0.0 {
+                points.push(Vec3::NAN);
+                continue;
+            }
+            let x = (column as f64 - scan.intrinsics.cx) / scan.intrinsics.fx;
+            points.push((camera.translation + (axes[0] * x + axes[1] * y + axes[2]) * depth).as_vec3());
+        }
+    }
+    points
+}
+
+/// The convex hull of points, counter-clockwise (Andrew's monotone chain); fewer than three points are returned as
+/// they are.
+pub(crate) fn convex_hull(mut points: Vec<DVec2>) -> Vec<DVec2> {
+    points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
+    points.dedup();
+    if points.len() < 3 {
+        return points;
+    }
+    let mut hull: Vec<DVec2> = Vec::new();
+    let half = |hull: &mut Vec<DVec2>, points: &mut dyn Iterator<Item = DVec2>| {
+        let start = hull.len();
+        for point in points {
+            while hull.len() >= start + 2 {
+                let (a, b) = (hull[hull.len() - 2], hull[hull.len() - 1]);
+                if (b - a).perp_dot(point - a) > 0.0 {
+                    break;
+                }
+                hull.pop();
+            }
+            hull.push(point);
+        }
+        hull.pop();
+    };
+    half(&mut hull, &mut points.iter().copied());
+    half(&mut hull, &mut points.iter().rev().copied());
+    hull
+}
+
+/// How far a point lies outside a convex polygon; negative inside (distance to the nearest edge).
+pub(crate) fn distance_outside(polygon: &[DVec2], point: DVec2) -> f64 {
+    let (mut inside, mut nearest2) = (f64::NEG_INFINITY, f64::INFINITY);
+    for (i, &a) in polygon.iter().enumerate() {
+        let b = polygon[(i + 1) % polygon.len()];
+        let (edge, to) = (b - a, point - a);
+        let length = edge.length().max(1e-12);
+        inside = inside.max(-edge.perp_dot(to) / length);
+        let share = (to.dot(edge) / (length * length)).clamp(0.0, 1.0);
+        nearest2 = nearest2.min((to - edge * share).length_squared());
+    }
+    if inside > 0.0 { nearest2.sqrt() } else { inside }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn the_hull_contains_its_points_and_turns_left(raw in prop::collection::vec((-1.0..1.0f64, -1.0..1.0f64), 3..60)) {
+            let points: Vec<DVec2> = raw.into_iter().map(DVec2::from).collect();
+            let hull = convex_hull(points.clone());
+            prop_assert!(hull.len() >= 3);
+            for (i, a) in hull.iter().enumerate() {
+                let (b, c) = (hull[(i + 1) % hull.len()], hull[(i + 2) % hull.len()]);
+                prop_assert!((b - *a).perp_dot(c - b) > 0.0);
+            }
+            for point in points {
+                prop_assert!(distance_outside(&hull, point) <= 1e-9);
+            }
+        }
+    }
+
+    #[test]
+    fn the_distance_to_a_square_is_signed() {
+        let square = convex_hull([(0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (0.0, 2.0)].map(DVec2::from).to_vec());
+        assert_eq!(distance_outside(&square, DVec2::new(1.0, 1.5)), -0.5);
+        assert_eq!(distance_outside(&square, DVec2::new(3.0, 1.0)), 1.0);
+        assert_eq!(distance_outside(&square, DVec2::new(5.0, 6.0)), 5.0);
+    }
+}

@@ -1,0 +1,255 @@
+//! Cuts what stands on the plane into segments: a graph over neighbouring pixels, broken where the depth jumps or
+//! where the surface bends inwards, as it does where two solid things touch.
+
+use crate::{grid::Grid, scene::Scene};
+use glam::Vec3;
+
+/// Label of pixels that belong to no segment.
+pub(crate) const NONE: u32 = u32::MAX;
+
+/// What stands on the plane, cut into things.
+pub(crate) struct Segments {
+    /// Segment of every pixel, [`NONE`] elsewhere.
+    pub labels: Vec<u32>,
+    /// Number of segments.
+    pub count: usize,
+}
+
+impl Segments {
+    /// Pixels of every segment, ascending.
+    pub fn pixels(&self) -> Vec<Vec<usize>> {
+        let mut pixels = vec![Vec::new(); self.count];
+        for (index, &label) in self.labels.iter().enumerate() {
+            if let Some(list) = pixels.get_mut(label as usize) {
+                list.push(index);
+            }
+        }
+        pixels
+    }
+    /// Keeps the given segments and numbers them anew.
+    pub fn keep(&mut self, kept: &[bool]) {
+        let mut names = vec![NONE; self.count];
+        let mut count = 0;
+        for (label, _) in kept.iter().enumerate().filter(|(_, keep)| **keep) {
+            names[label] = count;
+            count += 1;
+        }
+        for label in &mut self.labels {
+            *label = names.get(*label as usize).copied().unwrap_or(NONE);
+        }
+        self.count = count as usize;
+    }
+}
+
+/// Half of the distance over which the bend of the surface is judged, pixels.
+const BEND_STEP: usize = 4;
+
+pub(crate) fn split(scene: &Scene) -> Segments {
+    let normals = normals(scene);
+    let jumps = jumps(scene, &normals);
+    let core: Vec<bool> = (0..scene.grid.len()).map(|i| scene.rising[i] && !jumps[i]).collect();
+    let bends = bends(scene, &normals);
+    let step_m = |a: usize| 0.004 + 0.008 * scene.scan.smooth[a] + 2.0 * noise_m(scene, a);
+    let joined =
+        |a: usize, b: usize| (scene.scan.smooth[a] - scene.scan.smooth[b]).abs() < step_m(a) && !(bends[a] || bends[b]);
+    let (mut labels, sizes) = scene.grid.components(&core, joined);
+    let least = scene.config.min_segment_px * 2 / 3;
+    for label in &mut labels {
+        if sizes.get(*label as usize).is_none_or(|size| *size < least) {
+            *label = NONE;
+        }
+    }
+    grow(scene, &mut labels, 12);
+    let mut segments = Segments { count: sizes.len(), labels };
+    adopt_remains(scene, &mut segments);
+    merge_smooth(scene, &normals, &mut segments);
+    drop_small(scene, &mut segments);
+    segments
+}
+
+fn noise_m(scene: &Scene, pixel: usize) -> f32 {
+    (scene.noise_ratio * scene.config.depth_sigma_m(f64::from(scene.scan.smooth[pixel]))) as f32
+}
+
+/// Unit normals towards the camera by differences over a few pixels, wider the noisier the frame; zero where unknown.
+fn normals(scene: &Scene) -> Vec<Vec3> {
+    let reach = (2.0 + 3.0 * scene.noise_ratio).round().clamp(3.0, 6.0) as isize;
+    let eye = scene.camera.translation.as_vec3();
+    let mut normals = vec![Vec3::ZERO; scene.grid.len()];
+    let near = scene.grid.dilate(&scene.rising, 2);
+    for index in (0..scene.grid.len()).filter(|&i| near[i] && scene.is_known(i)) {
+        let here = scene.point[index];
+        let z = scene.scan.smooth[index];
+        let gate = 0.01 + 0.02 * z + 2.0 * noise_m(scene, index);
+        // The farthest neighbour in each direction that is still near in depth.
+        let reach_to = |dx: isize, dy: isize| {
+            (1..=reach).rev().find_map(|step| {
+                let at = scene.grid.offset(index, dx * step, dy * step)?;
+                (scene.is_known(at) && (scene.scan.smooth[at] - z).abs() < gate).then(|| scene.point[at])
+            })
+        };
+        let across = reach_to(1, 0).unwrap_or(here) - reach_to(-1, 0).unwrap_or(here);
+        let down = reach_to(0, 1).unwrap_or(here) - reach_to(0, -1).unwrap_or(here);
+        let normal = across.cross(down).normalize_or_zero();
+        normals[index] = if normal.dot(eye - here) < 0.0 { -normal } else { normal };
+    }
+    normals
+}
+
+/// Pixels next to a step in depth that the slope of their own surface does not explain, or next to a hole.
+fn jumps(scene: &Scene, normals: &[Vec3]) -> Vec<bool> {
+    let far: Vec<f32> = scene.scan.smooth.iter().map(|&z| if z > 0.0 { z } else { f32::MIN }).collect();
+    let near: Vec<f32> = scene.scan.smooth.iter().map(|&z| if z > 0.0 { z } else { f32::MAX }).collect();
+    let (high, low) = (scene.grid.window(&far, 2, f32::max), scene.grid.window(&near, 2, f32::min));
+    let hole: Vec<bool> = scene.scan.smooth.iter().map(|&z| z <= 0.0).collect();
+    let beside_hole = scene.grid.dilate(&hole, 1);
+    let focal = scene.scan.intrinsics.fx as f32;
+    let eye = scene.camera.translation.as_vec3();
+    let is_jump = |index: usize| {
+        if !scene.rising[index] {
+            return false;
+        }
+        let z = scene.scan.smooth[index];
+        let cosine = normals[index].dot((eye - scene.point[index]).normalize_or_zero()).clamp(0.2, 1.0);
+        let slope = (1.0 - cosine * cosine).sqrt() / cosine;
+        let expected = 4.0 * z / focal * slope;
+        let limit = 0.005 + 0.004 * z + 1.3 * expected + 1.5 * noise_m(scene, index);
+        beside_hole[index] || high[index] - low[index] > limit
+    };
+    (0..scene.grid.len()).map(is_jump).collect()
+}
+
+/// Pixels at which the surface bends inwards, in a row or in a column.
+fn bends(scene: &Scene, normals: &[Vec3]) -> Vec<bool> {
+    let step = BEND_STEP as isize;
+    let inwards = |index: usize, dx: isize, dy: isize| {
+        let (Some(a), Some(b)) =
+            (scene.grid.offset(index, -dx * step, -dy * step), scene.grid.offset(index, dx * step, dy * step))
+        else {
+            return false;
+        };
+        let (na, nb) = (normals[a], normals[b]);
+        if na == Vec3::ZERO || nb == Vec3::ZERO {
+            return false;
+        }
+        let across = scene.point[b] - scene.point[a];
+        let length = across.length();
+        let turn = (nb - na).dot(across) / (length + 1e-9);
+        turn < -0.3 && na.dot(nb) < 0.88 && length < 0.06
+    };
+    (0..scene.grid.len()).map(|i| scene.rising[i] && (inwards(i, 1, 0) || inwards(i, 0, 1))).collect()
+}
+
+/// Gives unlabelled pixels of standing things to the segment that reaches them first, within `reach_px` steps and
+/// 2 cm of where it began.
+fn grow(scene: &Scene, labels: &mut [u32], reach_px: usize) {
+    let mut front: Vec<(usize, usize)> = Vec::new();
+    for index in 0..labels.len() {
+        if labels[index] != NONE && scene.grid.neighbours(index).any(|n| labels[n] == NONE && scene.rising[n]) {
+            front.push((index, index));
+        }
+    }
+    for _ in 0..reach_px {
+        let mut next = Vec::new();
+        for (index, seed) in front {
+            for neighbour in scene.grid.neighbours(index) {
+                let step = scene.point[neighbour].distance(scene.point[index]);
+                let near = scene.point[neighbour].distance(scene.point[seed]) < 0.02 && step < 0.015;
+                if labels[neighbour] == NONE && scene.rising[neighbour] && near {
+                    labels[neighbour] = labels[index];
+                    next.push((neighbour, seed));
+                }
+            }
+        }
+        front = next;
+    }
+}
+
+/// Connected rests that no core was found in, small or thin things, become segments of their own.
+fn adopt_remains(scene: &Scene, segments: &mut Segments) {
+    let rest: Vec<bool> = (0..scene.grid.len()).map(|i| scene.rising[i] && segments.labels[i] == NONE).collect();
+    let joined = |a: usize, b: usize| (scene.scan.smooth[a] - scene.scan.smooth[b]).abs() < 0.012;
+    let (labels, sizes) = scene.grid.components(&rest, joined);
+    for (index, &label) in labels.iter().enumerate() {
+        if sizes.get(label as usize).is_some_and(|size| *size >= scene.config.min_segment_px) {
+            segments.labels[index] = segments.count as u32 + label;
+        }
+    }
+    segments.count += sizes.len();
+}
+
+/// Joins neighbours whose common border is mostly without a step and without an inward bend.
+fn merge_smooth(scene: &Scene, normals: &[Vec3], segments: &mut Segments) {
+    for _ in 0..3 {
+        let borders = borders(scene.grid, scene, normals, segments);
+        let mut sets = crate::grid::DisjointSets::new(segments.count);
+        let mut merged = false;
+        for ((a, b), (smooth, total)) in borders {
+            if total >= 8 && smooth as f64 > 0.65 * total as f64 {
+                sets.join(a as usize, b as usize);
+                merged = true;
+            }
+        }
+        if !merged {
+            return;
+        }
+        for label in segments.labels.iter_mut().filter(|label| **label != NONE) {
+            *label = sets.root(*label as usize) as u32;
+        }
+    }
+}
+
+/// For every pair of segments that touch in the image: border pixels that run on smoothly, and all of them.
+fn borders(
+    grid: Grid,
+    scene: &Scene,
+    normals: &[Vec3],
+    segments: &Segments,
+) -> std::collections::BTreeMap<(u32, u32), (usize, usize)> {
+    let mut borders = std::collections::BTreeMap::new();
+    let reach = BEND_STEP as isize + 1;
+    for index in 0..grid.len() {
+        let a = segments.labels[index];
+        if a == NONE {
+            continue;
+        }
+        for (dx, dy) in [(1, 0), (0, 1)] {
+            let Some(next) = grid.offset(index, dx, dy) else { continue };
+            let b = segments.labels[next];
+            if b == NONE || b == a {
+                continue;
+            }
+            let entry = borders.entry((a.min(b), a.max(b))).or_insert((0, 0));
+            entry.1 += 1;
+            let (Some(p), Some(q)) =
+                (grid.offset(index, -dx * reach, -dy * reach), grid.offset(next, dx * reach, dy * reach))
+            else {
+                continue;
+            };
+            let inside = segments.labels[p] == a && segments.labels[q] == b;
+            let step = (scene.scan.smooth[index] - scene.scan.smooth[next]).abs();
+            let across = scene.point[q] - scene.point[p];
+            let turn = (normals[q] - normals[p]).dot(across) / (across.length() + 1e-9);
+            if inside && step < 0.006 + noise_m(scene, index) && turn > -0.12 && across.length() < 0.05 {
+                entry.0 += 1;
+            }
+        }
+    }
+    borders
+}
+
+/// Drops segments that are too small or too flat to be things.
+fn drop_small(scene: &Scene, segments: &mut Segments) {
+    let pixels = segments.pixels();
+    let is_thing = |list: &Vec<usize>| {
+        if list.len() < scene.config.min_segment_px {
+            return false;
+        }
+        let mut heights: Vec<f32> = list.iter().map(|&i| scene.point[i].z / scene.height_limit_m(i)).collect();
+        heights.sort_by(f32::total_cmp);
+        // A thing reaches clearly above the limit; a ripple of the plane only just passes it.
+        heights[heights.len() * 9 / 10] > 1.35
+    };
+    let kept: Vec<bool> = pixels.iter().map(is_thing).collect();
+    segments.keep(&kept);
+}

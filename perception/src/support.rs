@@ -1,0 +1,209 @@
+//! The support plane: seeded RANSAC over a sparse sample, the largest connected inlier patch, robust refinement.
+
+use crate::{config::GrounderConfig, grid::Grid, scan::Scan};
+use glam::DVec3;
+use nalgebra::{Matrix3, Vector3};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+/// Sampling stride over the image, pixels.
+const STRIDE: usize = 4;
+/// Most planes that are scored.
+const MAX_SCORED: usize = 320;
+/// Most triples that are drawn.
+const MAX_DRAWN: usize = 6000;
+
+/// A plane in the camera frame: points `p` with `normal . p = offset`, normal towards the camera (offset < 0).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Plane {
+    pub normal: DVec3,
+    pub offset: f64,
+    /// Root mean square distance of the inliers, metres.
+    pub residual_m: f64,
+    /// Root mean square of the inliers' depth error over the sensor model's sigma: 1 where the model fits.
+    pub noise_ratio: f64,
+}
+
+impl Plane {
+    pub fn distance(&self, point: DVec3) -> f64 {
+        self.normal.dot(point) - self.offset
+    }
+    /// Depth at which a ray with z = 1 meets the plane, if it does so in front of the camera.
+    pub fn depth_along(&self, ray: DVec3) -> Option<f64> {
+        let slope = self.normal.dot(ray);
+        let depth = self.offset / slope;
+        (slope < -1e-6 && depth > 0.0).then_some(depth)
+    }
+}
+
+/// Which planes may be the support: the unit vector that points up in the camera frame and the largest angle of
+/// the normal to it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Upright {
+    pub up: DVec3,
+    pub max_angle_rad: f64,
+}
+
+/// The plane with the largest connected patch of inliers, and those inliers as a mask over every `STRIDE`-th pixel.
+pub(crate) fn find(scan: &Scan, excluded: &[bool], upright: Upright, config: &GrounderConfig) -> Option<Plane> {
+    let coarse = Coarse::sample(scan, excluded, config);
+    let measured = coarse.points.len();
+    if measured < 200 {
+        return None;
+    }
+    let mut candidates = draw(&coarse, upright, config);
+    candidates.sort_by(|a, b| b.0.cmp(&a.0));
+    let (mut best, mut best_size) = (None, 0);
+    for (_, plane) in candidates.into_iter().take(12) {
+        let refined = refine(&coarse, plane, upright);
+        let size = coarse.largest_patch(&refined).len();
+        if size > best_size {
+            (best, best_size) = (Some(refined), size);
+        }
+    }
+    let plane = best.filter(|_| best_size as f64 >= config.min_support_fraction * measured as f64)?;
+    Some(finish(&coarse, plane, upright))
+}
+
+/// A sparse sample of the frame.
+struct Coarse {
+    grid: Grid,
+    points: Vec<DVec3>,
+    sigma: Vec<f64>,
+    /// For each cell of the coarse grid its point, `u32::MAX` for none.
+    cells: Vec<u32>,
+}
+
+impl Coarse {
+    fn sample(scan: &Scan, excluded: &[bool], config: &GrounderConfig) -> Coarse {
+        let grid = Grid { width: scan.grid.width / STRIDE, height: scan.grid.height / STRIDE };
+        let (mut points, mut sigma, mut cells) = (Vec::new(), Vec::new(), vec![u32::MAX; grid.len()]);
+        for (cell, slot) in cells.iter_mut().enumerate() {
+            let pixel = scan.grid.index(grid.column(cell) * STRIDE + 1, grid.row(cell) * STRIDE + 1);
+            let depth = f64::from(scan.smooth[pixel]);
+            if depth > 0.0 && !excluded[pixel] {
+                *slot = points.len() as u32;
+                points.push(scan.ray(pixel) * depth);
+                sigma.push(config.depth_sigma_m(depth));
+            }
+        }
+        Coarse { grid, points, sigma, cells }
+    }
+    fn is_inlier(&self, plane: &Plane, index: usize) -> bool {
+        plane.distance(self.points[index]).abs() < 0.003 + 2.0 * self.sigma[index]
+    }
+    /// Indices of the largest connected set of inliers.
+    fn largest_patch(&self, plane: &Plane) -> Vec<usize> {
+        let inlier = |&cell: &u32| cell != u32::MAX && self.is_inlier(plane, cell as usize);
+        // Grown by one cell, so that lines of holes do not cut a table into pieces.
+        let mask: Vec<bool> = self.cells.iter().map(inlier).collect();
+        let (labels, _) = self.grid.components(&self.grid.dilate(&mask, 1), |_, _| true);
+        let count = labels.iter().filter(|l| **l != u32::MAX).max().map_or(0, |l| *l as usize + 1);
+        let mut sizes = vec![0usize; count];
+        for cell in (0..mask.len()).filter(|&c| mask[c]) {
+            sizes[labels[cell] as usize] += 1;
+        }
+        let Some(largest) = (0..count).max_by_key(|&l| (sizes[l], std::cmp::Reverse(l))) else { return Vec::new() };
+        let inside = |&cell: &usize| mask[cell] && labels[cell] as usize == largest;
+        (0..mask.len()).filter(inside).map(|cell| self.cells[cell] as usize).collect()
+    }
+}
+
+fn draw(coarse: &Coarse, upright: Upright, config: &GrounderConfig) -> Vec<(usize, Plane)> {
+    let mut random = ChaCha8Rng::seed_from_u64(config.seed);
+    let count = coarse.points.len();
+    let thinning = (count / 3000).max(1);
+    let cosine = upright.max_angle_rad.cos();
+    let mut scored = Vec::new();
+    for _ in 0..MAX_DRAWN {
+        if scored.len() >= MAX_SCORED {
+            break;
+        }
+        let [a, b, c] = [(); 3].map(|()| coarse.points[random.random_range(0..count)]);
+        let Some(normal) = (b - a).cross(c - a).try_normalize() else { continue };
+        let normal = if normal.dot(a) > 0.0 { -normal } else { normal };
+        let spread = (b - a).length().min((c - a).length()).min((c - b).length());
+        if normal.dot(upright.up) < cosine || spread < 0.03 {
+            continue;
+        }
+        let plane = Plane { normal, offset: normal.dot(a), residual_m: 0.0, noise_ratio: 1.0 };
+        let score = (0..count).step_by(thinning).filter(|&i| coarse.is_inlier(&plane, i)).count();
+        scored.push((score, plane));
+    }
+    scored
+}
+
+/// A few rounds of weighted least squares over the inliers.
+fn refine(coarse: &Coarse, mut plane: Plane, upright: Upright) -> Plane {
+    for _ in 0..3 {
+        let inliers: Vec<usize> =
+            (0..coarse.points.len()).step_by(2).filter(|&i| coarse.is_inlier(&plane, i)).collect();
+        plane = least_squares(coarse, &inliers, &plane, upright).unwrap_or(plane);
+    }
+    plane
+}
+
+/// The last refinement: only the largest patch, with bisquare weights; measures the residual.
+fn finish(coarse: &Coarse, mut plane: Plane, upright: Upright) -> Plane {
+    let mut inliers = Vec::new();
+    for _ in 0..4 {
+        inliers = coarse.largest_patch(&plane);
+        plane = least_squares(coarse, &inliers, &plane, upright).unwrap_or(plane);
+    }
+    let (mut squares, mut ratios) = (0.0, 0.0);
+    for &i in &inliers {
+        let distance = plane.distance(coarse.points[i]);
+        let ray = coarse.points[i] / coarse.points[i].z;
+        let along = distance / plane.normal.dot(ray).abs().max(0.1);
+        squares += distance * distance;
+        ratios += (along / coarse.sigma[i]).powi(2);
+    }
+    let count = inliers.len().max(1) as f64;
+    Plane { residual_m: (squares / count).sqrt(), noise_ratio: (ratios / count).sqrt(), ..plane }
+}
+
+fn least_squares(coarse: &Coarse, inliers: &[usize], old: &Plane, upright: Upright) -> Option<Plane> {
+    if inliers.len() < 50 {
+        return None;
+    }
+    let (mut total, mut centre) = (0.0, DVec3::ZERO);
+    let weight = |i: usize| {
+        let reduced = old.distance(coarse.points[i]) / (0.004 + 3.0 * coarse.sigma[i]);
+        (1.0 - reduced * reduced).max(0.0).powi(2) / (coarse.sigma[i] * coarse.sigma[i])
+    };
+    for &i in inliers {
+        total += weight(i);
+        centre += coarse.points[i] * weight(i);
+    }
+    if total <= 0.0 {
+        return None;
+    }
+    centre /= total;
+    let mut scatter = Matrix3::zeros();
+    for &i in inliers {
+        let d = coarse.points[i] - centre;
+        let v = Vector3::new(d.x, d.y, d.z);
+        scatter += v * v.transpose() * (weight(i) / total);
+    }
+    let eigen = scatter.symmetric_eigen();
+    let smallest = eigen.eigenvalues.imin();
+    let column = eigen.eigenvectors.column(smallest);
+    let normal = DVec3::new(column[0], column[1], column[2]).try_normalize()?;
+    let normal = if normal.dot(centre) > 0.0 { -normal } else { normal };
+    let tilted = normal.dot(upright.up) < upright.max_angle_rad.cos();
+    (!tilted).then(|| Plane { normal, offset: normal.dot(centre), ..*old })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ray_meets_the_plane_where_its_distance_is_zero() {
+        let plane = Plane { normal: DVec3::new(0.0, -0.6, -0.8), offset: -0.7, residual_m: 0.0, noise_ratio: 1.0 };
+        let ray = DVec3::new(0.1, 0.2, 1.0);
+        let depth = plane.depth_along(ray).unwrap();
+        assert!(plane.distance(ray * depth).abs() < 1e-12);
+        assert_eq!(plane.depth_along(DVec3::new(0.0, -2.0, 1.0)), None);
+    }
+}
