@@ -1,0 +1,284 @@
+//! One episode of a scenario, and the handles through which an agent lives in it.
+
+use crate::{
+    oracle::OracleVerdict,
+    report::{Preview, SimError, SimOptions, SimTimings, TrueObject},
+    scenario::{Scenario, TaskTemplate},
+    scene::{Ids, Stage, fnv, state_hash},
+    world::{World, cpu_s},
+};
+use acm_concept::{
+    camera::{CameraError, CameraModel, CameraSource, FrameHeader, Intrinsics, MAX_PIXELS, RgbdFrame},
+    embodiment::{Clock, Command, Embodiment, EmbodimentError, Feedback, RobotDescription},
+    ids::FrameId,
+    task::TaskSpec,
+    time::Time,
+};
+use acm_render::{
+    Renderer,
+    sensor::{SensorEpisode, SensorProfile},
+};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rustix::time::ClockId;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// A renderer that several simulations share: making one is expensive.
+pub type SharedRenderer = Arc<Mutex<Renderer>>;
+
+/// One episode. The handles share one world and can go to other threads.
+///
+/// ```
+/// # use acm_sim::{Scenario, SimOptions, Simulation};
+/// let scenario = Scenario::open("put-back-block")?;
+/// let simulation = Simulation::without_renderer(&scenario, &SimOptions::default())?;
+/// let mut robot = simulation.embodiment();
+/// let here = robot.feedback();
+/// let command = acm_concept::embodiment::Command { tcp: here.tcp, opening_m: 0.08, grip_force_n: 20.0 };
+/// assert!((robot.command(&command)?.time.seconds() - 0.02).abs() < 1e-9);
+/// assert!(!simulation.verdict().strict);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct Simulation {
+    shared: Arc<Mutex<World>>,
+    task: TaskTemplate,
+    cameras: Vec<Camera>,
+    stage: Arc<Stage>,
+    renderer: Option<SharedRenderer>,
+    seed: u64,
+}
+
+#[derive(Debug, Clone)]
+struct Camera {
+    nominal: CameraModel,
+    sensor: SensorEpisode,
+}
+
+impl Simulation {
+    /// Builds the world of a seed and lets it settle.
+    ///
+    /// # Errors
+    /// A seed without a valid layout, an object that is not at rest, an unknown sensor profile, an image size that
+    /// is not possible.
+    pub fn new(scenario: &Scenario, options: &SimOptions, renderer: SharedRenderer) -> Result<Simulation, SimError> {
+        let simulation = Simulation::without_renderer(scenario, options)?;
+        Ok(Simulation { renderer: Some(renderer), ..simulation })
+    }
+
+    /// As [`Simulation::new`], for work that takes no pictures: its cameras fail.
+    ///
+    /// # Errors
+    /// As [`Simulation::new`].
+    pub fn without_renderer(scenario: &Scenario, options: &SimOptions) -> Result<Simulation, SimError> {
+        let world = World::new(scenario, options)?;
+        let cameras = cameras(scenario, options)?;
+        let stage = Stage::new(&world, &scenario.world.lighting)?;
+        Ok(Simulation {
+            shared: Arc::new(Mutex::new(world)),
+            task: scenario.task.clone(),
+            cameras,
+            stage: Arc::new(stage),
+            renderer: None,
+            seed: options.seed,
+        })
+    }
+
+    /// The task as the agent gets it.
+    pub fn task(&self) -> TaskSpec {
+        TaskSpec {
+            instruction: self.task.instruction.clone(),
+            instruction_at_s: self.task.instruction_at_s,
+            budgets: self.task.budgets,
+            cameras: self.cameras.iter().map(|camera| camera.nominal.clone()).collect(),
+        }
+    }
+
+    /// The robot.
+    pub fn embodiment(&self) -> Box<dyn Embodiment> {
+        let robot = self.world().robot.clone();
+        Box::new(Robot { shared: self.shared.clone(), robot })
+    }
+
+    /// The cameras. Frames are numbered from 0 by each source.
+    pub fn camera(&self) -> Box<dyn CameraSource> {
+        let mut noise = ChaCha8Rng::seed_from_u64(self.seed);
+        noise.set_stream(STREAM_NOISE);
+        Box::new(Cameras {
+            shared: self.shared.clone(),
+            models: self.cameras.iter().map(|camera| camera.nominal.clone()).collect(),
+            cameras: self.cameras.clone(),
+            stage: self.stage.clone(),
+            renderer: self.renderer.clone(),
+            noise,
+            next: 0,
+        })
+    }
+
+    /// The clock.
+    pub fn clock(&self) -> Box<dyn Clock> {
+        Box::new(WorldClock { shared: self.shared.clone() })
+    }
+
+    /// How the episode stands. Reading it does not change the world.
+    pub fn verdict(&self) -> OracleVerdict {
+        self.world().verdict()
+    }
+
+    /// Equal for equal start worlds: where which solids are, to 0.1 mm and 0.01 rad, whatever their names.
+    pub fn world_digest(&self) -> String {
+        let world = self.world();
+        let mut lines: Vec<String> = world
+            .bodies
+            .iter()
+            .map(|body| {
+                let at = (body.start.translation * 1e4).round();
+                let size = (body.placed.size() * 1e4).round();
+                format!("{at} {:.2} {size} {:?}", body.start.yaw() + 0.0, body.placed.solids.first().map(|s| s.color))
+            })
+            .collect();
+        lines.sort();
+        format!("{:016x}", fnv(lines.join("\n").bytes()))
+    }
+
+    /// The objects as they truly are now. For analysing failures; never for the agent.
+    pub fn truth(&self) -> Vec<TrueObject> {
+        self.world().truth()
+    }
+
+    /// Processor time taken so far.
+    pub fn timings(&self) -> SimTimings {
+        self.world().timings
+    }
+
+    /// Equal for worlds whose bodies have bit-identical poses.
+    pub fn state_hash(&self) -> u64 {
+        state_hash(&self.world())
+    }
+
+    /// The world as a camera sees it now, without sensor errors; `None` is the main camera.
+    ///
+    /// # Errors
+    /// No renderer, no such camera, or the renderer fails.
+    pub fn preview(&self, camera: Option<&str>) -> Result<Preview, SimError> {
+        let renderer = self.renderer.as_ref().ok_or(SimError::NoRenderer)?;
+        let world = self.world();
+        let found = self.cameras.iter().find(|c| camera.is_none_or(|name| c.nominal.name == name));
+        let camera = found.ok_or_else(|| SimError::NoCamera { name: camera.unwrap_or_default().into() })?;
+        let mut renderer = lock(renderer);
+        let rendered = renderer.render(&self.stage.scene(&world), &camera.nominal)?;
+        let color = image::RgbImage::from_raw(rendered.width, rendered.height, rendered.color).unwrap_or_default();
+        Ok(Preview { color, ids: rendered.ids, legend: Ids::of(&world).legend(&world) })
+    }
+
+    fn world(&self) -> MutexGuard<'_, World> {
+        lock(&self.shared)
+    }
+}
+
+/// Streams of the episode's seed: 1 and 2 belong to layout and mishap.
+const STREAM_BIAS: u64 = 3;
+const STREAM_NOISE: u64 = 4;
+
+/// A panic elsewhere leaves the world between two steps, which is a valid state.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn cameras(scenario: &Scenario, options: &SimOptions) -> Result<Vec<Camera>, SimError> {
+    let mut bias = ChaCha8Rng::seed_from_u64(options.seed);
+    bias.set_stream(STREAM_BIAS);
+    let camera = |spec: &crate::scenario::CameraSpec| {
+        let profile = SensorProfile::named(options.sensor.as_deref().unwrap_or(&spec.sensor))?;
+        let mut nominal = spec.model.clone();
+        if let Some((width, height)) = options.camera_size {
+            let pixels = width as usize * height as usize;
+            if width.min(height) < 16 || pixels > MAX_PIXELS {
+                return Err(SimError::CameraSize { width, height });
+            }
+            let old = nominal.intrinsics;
+            let fov_y = 2.0 * (0.5 * f64::from(old.height) / old.fy).atan();
+            nominal.intrinsics = Intrinsics::from_vertical_fov(width, height, fov_y);
+        }
+        Ok(Camera { nominal, sensor: profile.episode(&mut bias) })
+    };
+    scenario.world.cameras.iter().map(camera).collect()
+}
+
+struct Robot {
+    shared: Arc<Mutex<World>>,
+    robot: RobotDescription,
+}
+
+impl Embodiment for Robot {
+    fn description(&self) -> &RobotDescription {
+        &self.robot
+    }
+    fn feedback(&self) -> Feedback {
+        lock(&self.shared).feedback()
+    }
+    fn command(&mut self, command: &Command) -> Result<Feedback, EmbodimentError> {
+        lock(&self.shared).command(command)
+    }
+    fn stop(&mut self) {
+        lock(&self.shared).stop();
+    }
+}
+
+struct WorldClock {
+    shared: Arc<Mutex<World>>,
+}
+
+impl Clock for WorldClock {
+    fn now(&self) -> Time {
+        lock(&self.shared).now()
+    }
+    fn wait_until(&mut self, moment: Time) -> Result<Time, EmbodimentError> {
+        lock(&self.shared).wait_until(moment)
+    }
+}
+
+struct Cameras {
+    shared: Arc<Mutex<World>>,
+    /// The nominal models, as the trait hands them out.
+    models: Vec<CameraModel>,
+    cameras: Vec<Camera>,
+    stage: Arc<Stage>,
+    renderer: Option<SharedRenderer>,
+    noise: ChaCha8Rng,
+    next: u64,
+}
+
+impl CameraSource for Cameras {
+    fn cameras(&self) -> &[CameraModel] {
+        &self.models
+    }
+    fn capture(&mut self, camera: &str) -> Result<RgbdFrame, CameraError> {
+        let failed = |reason: String| CameraError::Failed { name: camera.into(), reason };
+        let Some(found) = self.cameras.iter().find(|known| known.nominal.name == camera) else {
+            let known = self.models.iter().map(|model| model.name.as_str()).collect::<Vec<_>>().join(", ");
+            return Err(CameraError::UnknownCamera { name: camera.into(), known });
+        };
+        let renderer = self.renderer.as_ref().ok_or_else(|| failed("the simulation has no renderer".into()))?;
+        let mut world = lock(&self.shared);
+        let started = cpu_s(ClockId::ProcessCPUTime);
+        let scene = self.stage.scene(&world);
+        let truth = found.sensor.true_camera(&found.nominal);
+        let rendered = lock(renderer).render(&scene, &truth).map_err(|e| failed(e.to_string()))?;
+        world.timings.render_s += cpu_s(ClockId::ProcessCPUTime) - started;
+        let started = cpu_s(ClockId::ThreadCPUTime);
+        let measured = found.sensor.measure(&rendered, &truth, &mut self.noise);
+        world.timings.noise_s += cpu_s(ClockId::ThreadCPUTime) - started;
+        let header = FrameHeader {
+            id: FrameId(self.next),
+            camera: camera.into(),
+            time: world.now(),
+            intrinsics: found.nominal.intrinsics,
+            camera_pose: found.nominal.pose,
+        };
+        self.next += 1;
+        RgbdFrame::new(header, measured.color.into(), measured.depth.into()).map_err(|e| failed(e.to_string()))
+    }
+}
+
+#[cfg(test)]
+mod tests;

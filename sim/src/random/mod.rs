@@ -1,0 +1,9 @@
+//! Seeded randomness as data: streams, named draws and rejection.
+
+mod draws;
+mod numpy;
+mod stream;
+
+pub use draws::DrawError;
+pub(crate) use draws::{DrawKind, DrawSpec, Draws, Scope, count};
+pub(crate) use stream::{Stream, StreamKind};

@@ -1,0 +1,466 @@
+//! Turns the text of a scenario file into its meaning and refuses what makes no sense.
+
+use super::{
+    Scenario, ScenarioError, nearest,
+    raw::*,
+    spec::{PlaceAt, Reference, StageSpec, ViolationSpec},
+    *,
+};
+use crate::{
+    gripper,
+    model::ModelLibrary,
+    oracle,
+    random::{DrawKind, DrawSpec, StreamKind},
+};
+use acm_concept::{
+    camera::{CameraModel, Intrinsics, MAX_PIXELS},
+    expression::Expression,
+    pose::Pose,
+    suggest::suggest,
+    task::Budgets,
+};
+use acm_render::{Lighting, PointLight, Sun};
+use glam::{DMat3, DQuat, DVec3};
+
+const MAX_ITEMS: usize = 64;
+const MAX_ATTEMPTS: u32 = 100_000;
+
+pub(super) fn parse(file: &str, text: &str) -> Result<Scenario, ScenarioError> {
+    let wrong = |reason: String| ScenarioError::Format { file: file.into(), reason };
+    let raw: RawScenario = toml::from_str(text).map_err(|e| wrong(suggest(e.to_string())))?;
+    let mut models = ModelLibrary::embedded()?;
+    for model in &raw.model {
+        let problem = model.problem().map(|reason| ScenarioError::Model { file: file.into(), reason });
+        problem.map_or(Ok(()), Err)?;
+        models.add(model.clone());
+    }
+    Meaning::new(file, &raw, models)?.scenario()
+}
+
+struct Meaning<'a> {
+    file: &'a str,
+    raw: &'a RawScenario,
+    models: ModelLibrary,
+    /// Draws of one value.
+    scalars: Vec<String>,
+    /// Draws of several values.
+    lists: Vec<String>,
+}
+
+impl<'a> Meaning<'a> {
+    fn new(file: &'a str, raw: &'a RawScenario, models: ModelLibrary) -> Result<Self, ScenarioError> {
+        let mut meaning = Meaning { file, raw, models, scalars: Vec::new(), lists: Vec::new() };
+        meaning.check_sizes()?;
+        meaning.check_names()?;
+        for draw in raw.random.iter().flat_map(|random| &random.draw) {
+            let (name, is_list) = draw.name_and_shape();
+            if is_list { meaning.lists.push(name.into()) } else { meaning.scalars.push(name.into()) }
+        }
+        Ok(meaning)
+    }
+
+    fn scenario(&self) -> Result<Scenario, ScenarioError> {
+        let world = self.world()?;
+        let judge = self.judge(&world)?;
+        Ok(Scenario {
+            name: self.raw.scenario.clone(),
+            summary: self.raw.summary.clone(),
+            paraphrases: self.raw.task.paraphrases.clone(),
+            judge,
+            world,
+            task: self.task()?,
+        })
+    }
+
+    fn wrong(&self, field: impl Into<String>, reason: impl Into<String>) -> ScenarioError {
+        ScenarioError::Field { file: self.file.into(), field: field.into(), reason: reason.into() }
+    }
+
+    fn check_sizes(&self) -> Result<(), ScenarioError> {
+        let raw = self.raw;
+        let random = raw.random.as_ref();
+        let sizes = [
+            ("surface", raw.surface.len(), 1),
+            ("camera", raw.camera.len(), 1),
+            ("object", raw.object.len(), 0),
+            ("place", raw.place.len(), 0),
+            ("event", raw.event.len(), 0),
+            ("model", raw.model.len(), 0),
+            ("random.draw", random.map_or(0, |r| r.draw.len()), 0),
+            ("random.reject", random.map_or(0, |r| r.reject.len()), 0),
+            ("judge.strict.stage", raw.judge.strict.stage.len(), 1),
+        ];
+        for (field, size, least) in sizes {
+            if !(least..=MAX_ITEMS).contains(&size) {
+                return Err(self.wrong(field, format!("{least} to {MAX_ITEMS} are possible, there are {size}")));
+            }
+        }
+        Ok(())
+    }
+
+    fn check_names(&self) -> Result<(), ScenarioError> {
+        let raw = self.raw;
+        let draws = raw.random.iter().flat_map(|r| r.draw.iter().map(|draw| draw.name_and_shape().0));
+        let objects = raw.object.iter().map(|object| object.name.as_str());
+        let places = raw.place.iter().map(|place| place.name.as_str());
+        let mut seen: Vec<&str> = vec!["i", "n", "e"];
+        for name in draws.chain(objects).chain(places) {
+            if !is_name(name) {
+                let reason = "a name needs a lower-case letter first, then lower-case letters, digits, underscores";
+                return Err(self.wrong(format!("name `{name}`"), reason));
+            }
+            if seen.contains(&name) {
+                return Err(self.wrong(format!("name `{name}`"), "is taken; give every draw, object and place its own"));
+            }
+            seen.push(name);
+        }
+        if raw.scenario.is_empty()
+            || !raw.scenario.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-')
+        {
+            return Err(self.wrong("scenario", "a scenario's name has lower-case letters, digits and dashes"));
+        }
+        Ok(())
+    }
+
+    fn task(&self) -> Result<TaskTemplate, ScenarioError> {
+        let raw = &self.raw.task;
+        let budgets = &raw.budgets;
+        self.within("task.instruction_at_s", raw.instruction_at_s, 0.0, 3600.0)?;
+        self.within("task.budgets.seconds", budgets.seconds, 1.0, 7200.0)?;
+        if raw.instruction.trim().is_empty() {
+            return Err(self.wrong("task.instruction", "is empty"));
+        }
+        Ok(TaskTemplate {
+            instruction: raw.instruction.clone(),
+            instruction_at_s: raw.instruction_at_s,
+            budgets: Budgets { seconds: budgets.seconds, skills: budgets.skills, frames: budgets.frames },
+        })
+    }
+
+    fn world(&self) -> Result<WorldSpec, ScenarioError> {
+        let raw = self.raw;
+        let random = raw.random.as_ref();
+        let draws: Vec<DrawSpec> = match random {
+            Some(random) => random.draw.iter().enumerate().map(|(at, d)| self.draw(at, d)).collect::<Result<_, _>>()?,
+            None => Vec::new(),
+        };
+        let attempts = random.map_or(1, |r| r.attempts);
+        if attempts == 0 || attempts > MAX_ATTEMPTS {
+            return Err(self.wrong("random.attempts", format!("{attempts} must lie in 1 to {MAX_ATTEMPTS}")));
+        }
+        let workspace = raw.robot.workspace.map_or(gripper::WORKSPACE, |[low, high]| [low.into(), high.into()]);
+        let home = raw.robot.home.map_or(gripper::HOME, DVec3::from);
+        if !(home.cmpge(workspace[0]).all() && home.cmple(workspace[1]).all()) {
+            return Err(self.wrong("robot.home", format!("{home} lies outside of the workspace")));
+        }
+        Ok(WorldSpec {
+            surfaces: raw.surface.iter().map(|s| self.surface(s)).collect::<Result<_, _>>()?,
+            lighting: raw.light.as_ref().map_or_else(Lighting::default, lighting),
+            cameras: raw.camera.iter().map(|c| self.camera(c)).collect::<Result<_, _>>()?,
+            home,
+            workspace,
+            stream: random.map_or(StreamKind::Chacha8, |r| r.stream),
+            attempts,
+            rejects: random.iter().flat_map(|r| &r.reject).map(|r| self.reject(r, &draws)).collect::<Result<_, _>>()?,
+            draws,
+            objects: (0..raw.object.len()).map(|at| self.object(at)).collect::<Result<_, _>>()?,
+            places: raw.place.iter().map(|p| self.place(p)).collect::<Result<_, _>>()?,
+            events: raw.event.iter().map(|e| self.event(e)).collect::<Result<_, _>>()?,
+        })
+    }
+
+    fn surface(&self, raw: &RawSurface) -> Result<SurfaceSpec, ScenarioError> {
+        let size = DVec3::from(raw.size);
+        if !(size.is_finite() && size.min_element() > 0.0 && size.max_element() <= 20.0) {
+            return Err(self.wrong(format!("surface `{}`", raw.name), format!("size {size} must lie in (0, 20] m")));
+        }
+        Ok(SurfaceSpec {
+            name: raw.name.clone(),
+            size,
+            position: raw.position.into(),
+            color: raw.color,
+            friction: raw.friction,
+            support: raw.support,
+        })
+    }
+
+    fn camera(&self, raw: &RawCamera) -> Result<CameraSpec, ScenarioError> {
+        let field = format!("camera `{}`", raw.name);
+        let pixels = raw.width as usize * raw.height as usize;
+        if raw.width < 16 || raw.height < 16 || pixels > MAX_PIXELS {
+            return Err(self.wrong(field, format!("{}x{} pixels: too few or too many", raw.width, raw.height)));
+        }
+        self.within(&format!("{field}.fov_y_deg"), raw.fov_y_deg, 1.0, 170.0)?;
+        self.within(&format!("{field}.depth_max_m"), raw.depth_max_m, raw.depth_min_m.max(0.01), 100.0)?;
+        let (forward, left) = (DVec3::from(raw.forward), DVec3::from(raw.left));
+        // A camera frame has x right, y down, z forward.
+        let (Some(z), Some(y)) = (forward.try_normalize(), forward.cross(-left).try_normalize()) else {
+            return Err(self.wrong(field, "forward and left must be two different directions"));
+        };
+        let rotation = DQuat::from_mat3(&DMat3::from_cols(y.cross(z), y, z)).normalize();
+        let model = CameraModel {
+            name: raw.name.clone(),
+            intrinsics: Intrinsics::from_vertical_fov(raw.width, raw.height, raw.fov_y_deg.to_radians()),
+            pose: Pose::new(raw.position.into(), rotation),
+            depth_min_m: raw.depth_min_m,
+            depth_max_m: raw.depth_max_m,
+        };
+        Ok(CameraSpec { model, sensor: raw.sensor.clone() })
+    }
+
+    fn draw(&self, at: usize, raw: &RawDraw) -> Result<DrawSpec, ScenarioError> {
+        let (name, _) = raw.name_and_shape();
+        let field = format!("draw `{name}`");
+        // Only what was drawn before can be used.
+        let before: Vec<&str> = self
+            .raw
+            .random
+            .iter()
+            .flat_map(|r| &r.draw)
+            .take(at)
+            .filter_map(|draw| {
+                let (name, is_list) = draw.name_and_shape();
+                (!is_list).then_some(name)
+            })
+            .collect();
+        let number = |value: &Number| self.number(&field, value, &before);
+        let repeat = |count: &Option<Number>| count.as_ref().map(&number).transpose();
+        let (kind, count) = match raw {
+            RawDraw::Uniform { low, high, count, .. } => {
+                (DrawKind::Uniform { low: number(low)?, high: number(high)? }, repeat(count)?)
+            }
+            RawDraw::Normal { mean, deviation, count, .. } => {
+                (DrawKind::Normal { mean: number(mean)?, deviation: number(deviation)? }, repeat(count)?)
+            }
+            RawDraw::Integer { low, high, count, .. } => {
+                (DrawKind::Integer { low: number(low)?, high: number(high)? }, repeat(count)?)
+            }
+            RawDraw::Choice { from, count, .. } => {
+                if from.is_empty() || from.len() > MAX_ITEMS {
+                    return Err(self.wrong(field, format!("a choice needs 1 to {MAX_ITEMS} numbers")));
+                }
+                (DrawKind::Choice { from: from.clone() }, repeat(count)?)
+            }
+            RawDraw::Permutation { of, .. } => (DrawKind::Permutation, Some(number(of)?)),
+        };
+        Ok(DrawSpec { name: name.into(), kind, count })
+    }
+
+    fn reject(&self, raw: &RawReject, draws: &[DrawSpec]) -> Result<RejectSpec, ScenarioError> {
+        let known = || self.objects().chain(self.raw.place.iter().map(|place| place.name.as_str()));
+        for name in &raw.between {
+            if !known().any(|candidate| candidate == name) {
+                let reason = format!("there is no object or place `{name}`{}", nearest(name, known()));
+                return Err(self.wrong("random.reject.between", reason));
+            }
+        }
+        self.within("random.reject.nearer_than_m", raw.nearer_than_m, 0.0, 10.0)?;
+        let redraw_from = match &raw.redraw_from {
+            None => 0,
+            Some(name) => draws.iter().position(|draw| draw.name == *name).ok_or_else(|| {
+                let names = draws.iter().map(|draw| draw.name.as_str());
+                self.wrong("random.reject.redraw_from", format!("there is no draw `{name}`{}", nearest(name, names)))
+            })?,
+        };
+        Ok(RejectSpec { between: raw.between.clone(), nearer_than_m: raw.nearer_than_m, redraw_from })
+    }
+
+    fn object(&self, at: usize) -> Result<ObjectSpec, ScenarioError> {
+        let raw = &self.raw.object[at];
+        let field = format!("object `{}`", raw.name);
+        let model = self.models.get(&raw.model).ok_or_else(|| {
+            let known = self.models.names().collect::<Vec<_>>().join(", ");
+            let hint = nearest(&raw.model, self.models.names());
+            self.wrong(&field, format!("there is no object model `{}`{hint}; known: {known}", raw.model))
+        })?;
+        let mut names = self.plain_names();
+        if raw.count.is_some() {
+            names.extend(self.lists.iter().map(String::as_str));
+            names.extend(["i", "n"]);
+        }
+        if raw.position.is_none() && raw.on.is_none() {
+            return Err(self.wrong(field, "needs a position, or an object to stand `on`"));
+        }
+        let on = raw.on.as_ref().map(|on| {
+            if !self.raw.object[..at].iter().any(|object| object.name == on.object) {
+                return Err(self.wrong(&field, format!("stands on `{}`, which is not declared before it", on.object)));
+            }
+            self.reference(&field, on)
+        });
+        if let Some(perturb) = raw.perturb {
+            self.within(&format!("{field}.perturb.share"), perturb.share, 0.0, 1.0)?;
+            self.within(&format!("{field}.perturb.size_m"), perturb.size_m, 0.0, 0.01)?;
+            self.within(&format!("{field}.perturb.bevel_m"), perturb.bevel_m, 0.0, 0.01)?;
+        }
+        let origin = [Number::Plain(0.0), Number::Plain(0.0), Number::Plain(0.0)];
+        Ok(ObjectSpec {
+            name: raw.name.clone(),
+            model: model.clone(),
+            count: raw.count.as_ref().map(|count| self.number(&field, count, &self.plain_names())).transpose()?,
+            position: self.triple(&field, raw.position.as_ref().unwrap_or(&origin), &names)?,
+            yaw: self.number(&field, raw.yaw.as_ref().unwrap_or(&Number::Plain(0.0)), &names)?,
+            on: on.transpose()?,
+            perturb: raw.perturb,
+        })
+    }
+
+    fn place(&self, raw: &RawPlace) -> Result<PlaceSpec, ScenarioError> {
+        let field = format!("place `{}`", raw.name);
+        let at = match (&raw.of, &raw.centroid_of, &raw.position) {
+            (Some(of), None, None) => PlaceAt::Object(self.reference(&field, of)?),
+            (None, Some(object), None) => PlaceAt::CentroidOf(self.known_object(&field, object)?),
+            (None, None, Some(position)) => PlaceAt::Position(self.triple(&field, position, &self.plain_names())?),
+            _ => return Err(self.wrong(field, "needs exactly one of `of`, `centroid_of`, `position`")),
+        };
+        Ok(PlaceSpec { name: raw.name.clone(), at })
+    }
+
+    fn event(&self, raw: &RawEvent) -> Result<EventSpec, ScenarioError> {
+        let field = format!("event `{}`", raw.name);
+        self.within(&format!("{field}.after_s"), raw.after_s, 0.0, 7200.0)?;
+        self.within(&format!("{field}.over_s"), raw.over_s, 0.02, 600.0)?;
+        self.within(&format!("{field}.lift_m"), raw.lift_m, 0.0, 2.0)?;
+        let carry = self.reference(&field, &raw.carry)?;
+        let known = oracle::names(self.raw.object.iter().map(|object| self.visible_to_judge(object)), &self.others());
+        let when = raw.when.as_ref().map(|text| self.expression(&field, text, &as_strs(&known))).transpose()?;
+        Ok(EventSpec {
+            name: raw.name.clone(),
+            after_s: raw.after_s,
+            when,
+            carry,
+            to: self.triple(&field, &raw.to, &self.plain_names())?,
+            yaw: self.number(&field, raw.yaw.as_ref().unwrap_or(&Number::Plain(0.0)), &self.plain_names())?,
+            over_s: raw.over_s,
+            lift_m: raw.lift_m,
+        })
+    }
+
+    fn judge(&self, world: &WorldSpec) -> Result<JudgeSpec, ScenarioError> {
+        let raw = &self.raw.judge;
+        for name in &raw.moves {
+            self.known_object("judge.moves", name)?;
+        }
+        let objects =
+            world.objects.iter().map(|o| (o.count.is_none().then_some(o.name.as_str()), o.model.button.is_some()));
+        let known = oracle::names(objects, &self.others());
+        let known = as_strs(&known);
+        Ok(JudgeSpec {
+            moves: raw.moves.clone(),
+            strict: self.predicate("judge.strict", &raw.strict, &known)?,
+            faithful: raw.faithful.as_ref().map(|p| self.predicate("judge.faithful", p, &known)).transpose()?,
+        })
+    }
+
+    fn predicate(&self, field: &str, raw: &RawPredicate, known: &[&str]) -> Result<PredicateSpec, ScenarioError> {
+        let last = raw.stage.len().saturating_sub(1);
+        let stage = |(at, raw): (usize, &RawStage)| {
+            let field = format!("{field}.stage `{}`", raw.name);
+            self.within(&format!("{field}.hold_s"), raw.hold_s, 0.0, 60.0)?;
+            if raw.at_end && at != last {
+                return Err(self.wrong(field, "only the last stage can ask for at_end"));
+            }
+            let when = self.expression(&field, &raw.when, known)?;
+            Ok(StageSpec { name: raw.name.clone(), when, hold_s: raw.hold_s, at_end: raw.at_end })
+        };
+        let violation = |violation: &RawViolation| {
+            let field = format!("{field}.violation `{}`", violation.name);
+            let before = violation.before.as_ref().map(|name| {
+                let found = raw.stage.iter().position(|stage| stage.name == *name);
+                found.ok_or_else(|| self.wrong(&field, format!("there is no stage `{name}`")))
+            });
+            let when = self.expression(&field, &violation.when, known)?;
+            Ok(ViolationSpec { name: violation.name.clone(), when, before: before.transpose()? })
+        };
+        Ok(PredicateSpec {
+            stages: raw.stage.iter().enumerate().map(stage).collect::<Result<_, _>>()?,
+            violations: raw.violation.iter().map(violation).collect::<Result<_, _>>()?,
+        })
+    }
+
+    fn objects(&self) -> impl Iterator<Item = &str> {
+        self.raw.object.iter().map(|object| object.name.as_str())
+    }
+    fn known_object(&self, field: &str, name: &str) -> Result<String, ScenarioError> {
+        if self.objects().any(|known| known == name) {
+            return Ok(name.into());
+        }
+        Err(self.wrong(field, format!("there is no object `{name}`{}", nearest(name, self.objects()))))
+    }
+    fn reference(&self, field: &str, raw: &RawReference) -> Result<Reference, ScenarioError> {
+        let object = self.known_object(field, &raw.object)?;
+        let index = raw.index.as_ref().map(|index| self.number(field, index, &self.plain_names())).transpose()?;
+        Ok(Reference { object, index })
+    }
+    /// An object's name if it has no copies, and whether it has a button.
+    fn visible_to_judge(&self, object: &'a RawObject) -> (Option<&'a str>, bool) {
+        let button = self.models.get(&object.model).is_some_and(|model| model.button.is_some());
+        (object.count.is_none().then_some(object.name.as_str()), button)
+    }
+    /// Constants that the judge can name: places and plain draws.
+    fn others(&self) -> Vec<String> {
+        let places = self.raw.place.iter().flat_map(|p| ["x", "y", "z"].map(|axis| format!("{}_{axis}", p.name)));
+        places.chain(self.scalars.iter().cloned()).collect()
+    }
+    fn plain_names(&self) -> Vec<&str> {
+        self.scalars.iter().map(String::as_str).collect()
+    }
+
+    fn triple(&self, field: &str, numbers: &[Number; 3], names: &[&str]) -> Result<[Expression; 3], ScenarioError> {
+        let [x, y, z] = numbers;
+        Ok([self.number(field, x, names)?, self.number(field, y, names)?, self.number(field, z, names)?])
+    }
+    fn number(&self, field: &str, number: &Number, names: &[&str]) -> Result<Expression, ScenarioError> {
+        match number {
+            Number::Plain(value) if !value.is_finite() => Err(self.wrong(field, format!("{value} is not finite"))),
+            // The sign would be read as an operator, which is fine.
+            Number::Plain(value) => self.expression(field, &format!("{value}"), names),
+            Number::Expression(text) => self.expression(field, text, names),
+        }
+    }
+    fn expression(&self, field: &str, text: &str, names: &[&str]) -> Result<Expression, ScenarioError> {
+        Expression::parse(text, names).map_err(|source| ScenarioError::Expression {
+            file: self.file.into(),
+            field: field.into(),
+            source,
+        })
+    }
+    fn within(&self, field: &str, value: f64, low: f64, high: f64) -> Result<(), ScenarioError> {
+        if (low..=high).contains(&value) {
+            return Ok(());
+        }
+        Err(self.wrong(field, format!("{value} must lie in {low} to {high}")))
+    }
+}
+
+impl RawDraw {
+    /// The name, and whether it stands for several values.
+    fn name_and_shape(&self) -> (&str, bool) {
+        match self {
+            RawDraw::Uniform { name, count, .. }
+            | RawDraw::Normal { name, count, .. }
+            | RawDraw::Integer { name, count, .. }
+            | RawDraw::Choice { name, count, .. } => (name, count.is_some()),
+            RawDraw::Permutation { name, .. } => (name, true),
+        }
+    }
+}
+
+fn is_name(name: &str) -> bool {
+    name.starts_with(|c: char| c.is_ascii_lowercase())
+        && name.len() <= 40
+        && name.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_')
+}
+
+fn as_strs(names: &[String]) -> Vec<&str> {
+    names.iter().map(String::as_str).collect()
+}
+
+fn lighting(raw: &RawLight) -> Lighting {
+    let usual = Lighting::default();
+    let point = |raw: &RawPointLight| PointLight { position: raw.position.into(), intensity: raw.intensity };
+    Lighting {
+        ambient: raw.ambient,
+        sun: Sun { direction: raw.sun_direction.into(), intensity: raw.sun, ..usual.sun },
+        points: raw.point.iter().map(point).collect(),
+    }
+}

@@ -1,0 +1,184 @@
+//! Scenario files: one TOML file is parsed into what the simulator builds, what the judge decides, and what the
+//! agent is told. The three never mix.
+
+mod meaning;
+mod raw;
+mod spec;
+
+pub(crate) use raw::{Color, RawPerturb};
+pub(crate) use spec::{
+    CameraSpec, EventSpec, JudgeSpec, ObjectSpec, PlaceAt, PlaceSpec, PredicateSpec, Reference, RejectSpec,
+    SurfaceSpec, TaskTemplate, WorldSpec,
+};
+#[cfg(test)]
+pub(crate) use spec::{StageSpec, ViolationSpec};
+
+use acm_concept::expression::ExpressionError;
+use include_dir::{Dir, include_dir};
+use std::path::Path;
+use thiserror::Error;
+
+static EMBEDDED: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/scenarios");
+
+/// Largest scenario file that is read, bytes.
+pub const MAX_SCENARIO_BYTES: usize = 256 * 1024;
+
+/// A parsed and checked scenario. It can be simulated with any seed.
+///
+/// ```
+/// # use acm_sim::Scenario;
+/// let scenario = Scenario::open("put-back-block").unwrap();
+/// assert!(Scenario::names().contains(&scenario.name().to_string()));
+/// assert!(Scenario::open("put-back-blok").unwrap_err().to_string().contains("did you mean `put-back-block`?"));
+/// ```
+#[derive(Debug, Clone)]
+pub struct Scenario {
+    pub(crate) name: String,
+    pub(crate) summary: String,
+    pub(crate) paraphrases: Vec<String>,
+    pub(crate) world: WorldSpec,
+    pub(crate) judge: JudgeSpec,
+    pub(crate) task: TaskTemplate,
+}
+
+/// Why a scenario could not be used.
+#[derive(Debug, Error)]
+pub enum ScenarioError {
+    /// Neither a file nor an embedded scenario.
+    #[error("there is no scenario `{name}`, neither as a file nor by name{suggestion}; known: {known}")]
+    Unknown {
+        /// What was asked for.
+        name: String,
+        /// "; did you mean ...?", or nothing.
+        suggestion: String,
+        /// The embedded scenarios.
+        known: String,
+    },
+    /// The file cannot be read.
+    #[error("scenario file {file} cannot be read: {source}")]
+    Read {
+        /// The file.
+        file: String,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// Not TOML, an unknown field, or a value of the wrong type.
+    #[error("scenario file {file}: {reason}")]
+    Format {
+        /// The file.
+        file: String,
+        /// What is wrong, with a suggestion where a field's name is near a known one.
+        reason: String,
+    },
+    /// A value that makes no sense.
+    #[error("scenario file {file}, {field}: {reason}")]
+    Field {
+        /// The file.
+        file: String,
+        /// The field.
+        field: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// An expression that cannot be used.
+    #[error("scenario file {file}, {field}: {source}")]
+    Expression {
+        /// The file.
+        file: String,
+        /// The field.
+        field: String,
+        /// What is wrong.
+        source: ExpressionError,
+    },
+    /// An object model that cannot be used.
+    #[error("object model {file}: {reason}")]
+    Model {
+        /// The model's file.
+        file: String,
+        /// What is wrong.
+        reason: String,
+    },
+}
+
+impl Scenario {
+    /// Names of the scenarios that ship with the simulator, sorted.
+    pub fn names() -> Vec<String> {
+        let stem = |path: &Path| Some(path.file_stem()?.to_str()?.to_string());
+        let mut names: Vec<String> = EMBEDDED.files().filter_map(|file| stem(file.path())).collect();
+        names.sort();
+        names
+    }
+
+    /// Opens a scenario: a file if there is one of that path, else the embedded scenario of that name.
+    ///
+    /// # Errors
+    /// [`ScenarioError::Unknown`] with a suggestion and the list of names, or whatever is wrong with the file.
+    pub fn open(name_or_path: &str) -> Result<Scenario, ScenarioError> {
+        let path = Path::new(name_or_path);
+        if path.is_file() {
+            let read = |source| ScenarioError::Read { file: name_or_path.into(), source };
+            let length = std::fs::metadata(path).map_err(read)?.len();
+            if length > MAX_SCENARIO_BYTES as u64 {
+                return Err(too_large(name_or_path));
+            }
+            return Scenario::parse(name_or_path, &std::fs::read_to_string(path).map_err(read)?);
+        }
+        let file = format!("{name_or_path}.toml");
+        match EMBEDDED.get_file(&file).and_then(|file| file.contents_utf8()) {
+            Some(text) => Scenario::parse(&file, text),
+            None => Err(unknown(name_or_path)),
+        }
+    }
+
+    /// Reads a scenario from text; `file` is its name in messages.
+    ///
+    /// # Errors
+    /// What is wrong, with file and field.
+    pub fn parse(file: &str, text: &str) -> Result<Scenario, ScenarioError> {
+        if text.len() > MAX_SCENARIO_BYTES {
+            return Err(too_large(file));
+        }
+        meaning::parse(file, text)
+    }
+
+    /// The JSON Schema of scenario files, every field documented.
+    pub fn schema() -> String {
+        let schema = schemars::schema_for!(raw::RawScenario);
+        // A schema is plain JSON; printing it cannot fail.
+        serde_json::to_string_pretty(&schema).unwrap_or_default()
+    }
+
+    /// The scenario's name.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+    /// What it is about, one line.
+    pub fn summary(&self) -> &str {
+        &self.summary
+    }
+    /// Other wordings of the instruction.
+    pub fn paraphrases(&self) -> &[String] {
+        &self.paraphrases
+    }
+}
+
+fn too_large(file: &str) -> ScenarioError {
+    ScenarioError::Format { file: file.into(), reason: format!("larger than {MAX_SCENARIO_BYTES} bytes") }
+}
+
+fn unknown(name: &str) -> ScenarioError {
+    let known = Scenario::names();
+    let suggestion = nearest(name, known.iter().map(String::as_str));
+    ScenarioError::Unknown { name: name.into(), suggestion, known: known.join(", ") }
+}
+
+/// "; did you mean `x`?" for the nearest known name, or nothing if none is near.
+pub(crate) fn nearest<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> String {
+    match known.map(|candidate| (strsim::damerau_levenshtein(name, candidate), candidate)).min() {
+        Some((distance, best)) if distance <= 1 + name.len() / 3 => format!("; did you mean `{best}`?"),
+        _ => String::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests;

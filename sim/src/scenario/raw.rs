@@ -1,0 +1,490 @@
+//! The text of a scenario file, before its meaning is checked. The doc comments are the fields' documentation in
+//! the JSON schema.
+
+use crate::{model::ObjectModel, random::StreamKind};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A number, or an expression over named draws such as `"0.1 + radius * cos(phase + TAU * i / n)"`.
+///
+/// Operators: `+ - * / ^`, `< <= > >=` (1 or 0), `&& ||`, `min(a, b)`, `max(a, b)`, `abs sqrt sin cos floor round`
+/// and the usual functions; constants `PI`, `TAU`.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub(crate) enum Number {
+    /// A plain number.
+    Plain(f64),
+    /// An expression.
+    Expression(String),
+}
+
+/// A colour as `"#rrggbb"`, 8-bit sRGB.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(try_from = "String", into = "String")]
+#[schemars(with = "String")]
+pub(crate) struct Color(pub(crate) [u8; 3]);
+
+impl TryFrom<String> for Color {
+    type Error = String;
+    fn try_from(text: String) -> Result<Color, String> {
+        let wrong = || format!("`{text}` is not a colour: write it like `#rrggbb`");
+        let digits = text.strip_prefix('#').filter(|d| d.len() == 6 && d.is_ascii()).ok_or_else(wrong)?;
+        let channel = |at: usize| u8::from_str_radix(&digits[at..at + 2], 16).map_err(|e| format!("{}: {e}", wrong()));
+        Ok(Color([channel(0)?, channel(2)?, channel(4)?]))
+    }
+}
+impl From<Color> for String {
+    fn from(Color([r, g, b]): Color) -> String {
+        format!("#{r:02x}{g:02x}{b:02x}")
+    }
+}
+
+/// A scenario: the world, what is random in it, what the agent is told, and how the outcome is judged.
+///
+/// Metres, seconds, newtons; angles in degrees where the field says so, else in radians. World frame with z up.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct RawScenario {
+    /// Name of the scenario, lower case with dashes.
+    pub(crate) scenario: String,
+    /// What it is about, one line.
+    pub(crate) summary: String,
+    /// What the agent is told.
+    pub(crate) task: RawTask,
+    /// Bodies that never move: tables, walls.
+    pub(crate) surface: Vec<RawSurface>,
+    /// Lights; the default is ambient 0.5, a sun of 0.5 along (0, 0.5, -1) and points of 1 at (1, 0, 1.8) and
+    /// (-1, 0, 1.8).
+    #[serde(default)]
+    pub(crate) light: Option<RawLight>,
+    /// Cameras; the first is the main one.
+    pub(crate) camera: Vec<RawCamera>,
+    /// The robot.
+    #[serde(default)]
+    pub(crate) robot: RawRobot,
+    /// What is random, drawn in the order of the file.
+    #[serde(default)]
+    pub(crate) random: Option<RawRandom>,
+    /// Object models of this file alone, besides those that ship with the simulator.
+    #[serde(default)]
+    pub(crate) model: Vec<ObjectModel>,
+    /// The objects.
+    #[serde(default)]
+    pub(crate) object: Vec<RawObject>,
+    /// Named points of the start layout, for rejection rules and for the judge: `NAME_x`, `NAME_y`, `NAME_z`.
+    #[serde(default)]
+    pub(crate) place: Vec<RawPlace>,
+    /// What third parties do.
+    #[serde(default)]
+    pub(crate) event: Vec<RawEvent>,
+    /// How the outcome is judged. Never shown to the agent.
+    pub(crate) judge: RawJudge,
+}
+
+/// What the agent is told.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct RawTask {
+    /// The instruction in plain language.
+    pub(crate) instruction: String,
+    /// Other wordings of the same instruction.
+    #[serde(default)]
+    pub(crate) paraphrases: Vec<String>,
+    /// When the instruction is given, seconds; until then the agent watches. Default: 0.
+    #[serde(default)]
+    pub(crate) instruction_at_s: f64,
+    /// Limits of the episode.
+    pub(crate) budgets: RawBudgets,
+}
+
+/// Limits of the episode.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct RawBudgets {
+    /// Simulated seconds after the instruction.
+    pub(crate) seconds: f64,
+    /// Skills that may be executed.
+    pub(crate) skills: u32,
+    /// Frames that may be perceived.
+    pub(crate) frames: u32,
+}
+
+/// A fixed box.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct RawSurface {
+    /// Name, for messages.
+    pub(crate) name: String,
+    /// Edge lengths along x, y, z, metres.
+    pub(crate) size: [f64; 3],
+    /// Its centre, metres.
+    pub(crate) position: [f64; 3],
+    /// Colour.
+    pub(crate) color: Color,
+    /// Coulomb friction. Default: 0.5.
+    #[serde(default = "half")]
+    pub(crate) friction: f64,
+    /// Whether objects may be set down on its top. Default: false.
+    #[serde(default)]
+    pub(crate) support: bool,
+}
+
+/// Lights.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct RawLight {
+    /// Light that reaches every surface alike, 0-1.
+    pub(crate) ambient: f32,
+    /// Direction in which the sun's light travels.
+    pub(crate) sun_direction: [f64; 3],
+    /// Strength of the sun.
+    pub(crate) sun: f32,
+    /// Lights at points, without shadows.
+    #[serde(default)]
+    pub(crate) point: Vec<RawPointLight>,
+}
+
+/// A light at a point.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct RawPointLight {
+    /// Where, metres.
+    pub(crate) position: [f64; 3],
+    /// Strength at 1 m.
+    pub(crate) intensity: f32,
+}
+
+/// An RGB-D camera that stands still.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct RawCamera {
+    /// Name.
+    pub(crate) name: String,
+    /// Where it is, metres.
+    pub(crate) position: [f64; 3],
+    /// Direction of view. Need not have unit length.
+    pub(crate) forward: [f64; 3],
+    /// Direction of the image's left edge.
+    pub(crate) left: [f64; 3],
+    /// Image width, pixels. Default: 640.
+    #[serde(default = "width")]
+    pub(crate) width: u32,
+    /// Image height, pixels. Default: 480.
+    #[serde(default = "height")]
+    pub(crate) height: u32,
+    /// Full vertical opening angle, degrees.
+    pub(crate) fov_y_deg: f64,
+    /// Smallest depth that is measured, metres. Default: 0.2.
+    #[serde(default = "depth_min")]
+    pub(crate) depth_min_m: f64,
+    /// Largest depth that is measured, metres. Default: 6.
+    #[serde(default = "depth_max")]
+    pub(crate) depth_max_m: f64,
+    /// Name of the sensor profile. Default: `d435`, with per-episode bias.
+    #[serde(default = "d435")]
+    pub(crate) sensor: String,
+}
+
+/// The robot: a two-finger hand that floats on a wrist of limited force.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct RawRobot {
+    /// Where the tool centre point waits, metres; the hand looks down. Default: above the back of the table.
+    #[serde(default)]
+    pub(crate) home: Option<[f64; 3]>,
+    /// Corners of the workspace box, smallest and largest coordinates, metres.
+    #[serde(default)]
+    pub(crate) workspace: Option<[[f64; 3]; 2]>,
+}
+
+/// What is random.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct RawRandom {
+    /// The generator. It is seeded with the episode's seed.
+    pub(crate) stream: StreamKind,
+    /// How often rejected layouts are drawn anew before the scenario is given up. Default: 1000.
+    #[serde(default = "attempts")]
+    pub(crate) attempts: u32,
+    /// Named draws, made in the order of the file. Expressions after a draw can use its name.
+    #[serde(default)]
+    pub(crate) draw: Vec<RawDraw>,
+    /// Layouts that are drawn anew.
+    #[serde(default)]
+    pub(crate) reject: Vec<RawReject>,
+}
+
+/// A named draw.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, tag = "kind", rename_all = "kebab-case")]
+pub(crate) enum RawDraw {
+    /// Uniform between two bounds.
+    Uniform {
+        /// Name.
+        name: String,
+        /// Lower bound.
+        low: Number,
+        /// Upper bound.
+        high: Number,
+        /// Draw a list of so many values.
+        #[serde(default)]
+        count: Option<Number>,
+    },
+    /// Normally distributed.
+    Normal {
+        /// Name.
+        name: String,
+        /// Mean. Default: 0.
+        #[serde(default = "zero")]
+        mean: Number,
+        /// Standard deviation. Default: 1.
+        #[serde(default = "one")]
+        deviation: Number,
+        /// Draw a list of so many values.
+        #[serde(default)]
+        count: Option<Number>,
+    },
+    /// A whole number, both ends included.
+    Integer {
+        /// Name.
+        name: String,
+        /// Smallest value.
+        low: Number,
+        /// Largest value.
+        high: Number,
+        /// Draw a list of so many values.
+        #[serde(default)]
+        count: Option<Number>,
+    },
+    /// One of a list of numbers.
+    Choice {
+        /// Name.
+        name: String,
+        /// The numbers.
+        from: Vec<f64>,
+        /// Draw a list of so many values.
+        #[serde(default)]
+        count: Option<Number>,
+    },
+    /// A random order of 0, 1, ... `of` - 1.
+    Permutation {
+        /// Name.
+        name: String,
+        /// How many.
+        of: Number,
+    },
+}
+
+/// Layouts in which two things are too near each other are drawn anew.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct RawReject {
+    /// Two names of objects or places. The same name twice: any two copies of that object.
+    pub(crate) between: [String; 2],
+    /// Smallest gap between their solids, metres.
+    pub(crate) nearer_than_m: f64,
+    /// The draw from which on all is drawn anew. Default: the first.
+    #[serde(default)]
+    pub(crate) redraw_from: Option<String>,
+}
+
+/// An object, or several alike.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct RawObject {
+    /// Name: lower-case letters, digits and underscores, a letter first.
+    pub(crate) name: String,
+    /// Name of its model.
+    pub(crate) model: String,
+    /// How many copies. In a copy's expressions `i` is its number from 0, `n` the count, and the name of a list of
+    /// draws stands for the list's value at `i`.
+    #[serde(default)]
+    pub(crate) count: Option<Number>,
+    /// Where its base frame is (the middle of its bottom), metres; with `on`, relative to the top of that object.
+    #[serde(default)]
+    pub(crate) position: Option<[Number; 3]>,
+    /// Heading, radians; with `on`, relative to that object. Default: 0.
+    #[serde(default)]
+    pub(crate) yaw: Option<Number>,
+    /// The object that it stands on, declared before this one.
+    #[serde(default)]
+    pub(crate) on: Option<RawReference>,
+    /// Deviations of single copies from the model, drawn from a stream of their own.
+    #[serde(default)]
+    pub(crate) perturb: Option<RawPerturb>,
+}
+
+/// An object, or one copy of several.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct RawReference {
+    /// Name of the object.
+    pub(crate) object: String,
+    /// Which copy, from 0. Default: 0.
+    #[serde(default)]
+    pub(crate) index: Option<Number>,
+}
+
+/// How far real copies differ from their model.
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct RawPerturb {
+    /// Share of the copies that differ, 0-1. Default: 0.3.
+    #[serde(default = "third")]
+    pub(crate) share: f64,
+    /// Every edge length changes by up to this much, metres, at most 0.01. Default: 0.0015.
+    #[serde(default = "jitter")]
+    pub(crate) size_m: f64,
+    /// Width of the bevel at the edges of boxes, metres, at most 0.01. Default: 0.001.
+    #[serde(default = "bevel")]
+    pub(crate) bevel_m: f64,
+}
+
+/// A named point of the start layout.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct RawPlace {
+    /// Name: lower-case letters, digits and underscores, a letter first.
+    pub(crate) name: String,
+    /// The base frame of an object.
+    #[serde(default)]
+    pub(crate) of: Option<RawReference>,
+    /// The mean of all copies of an object.
+    #[serde(default)]
+    pub(crate) centroid_of: Option<String>,
+    /// A point, metres.
+    #[serde(default)]
+    pub(crate) position: Option<[Number; 3]>,
+}
+
+/// A third party carries an object from where it is to another place.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct RawEvent {
+    /// Name, for messages.
+    pub(crate) name: String,
+    /// Happens this long after the start, or after `when` first holds, seconds. Default: 0.
+    #[serde(default)]
+    pub(crate) after_s: f64,
+    /// Condition over the judge's variables that starts the timer. Default: the start of the episode.
+    #[serde(default)]
+    pub(crate) when: Option<String>,
+    /// What is carried.
+    pub(crate) carry: RawReference,
+    /// Where its base frame comes to stand, metres.
+    pub(crate) to: [Number; 3],
+    /// Its heading there, radians. Default: 0.
+    #[serde(default)]
+    pub(crate) yaw: Option<Number>,
+    /// How long it takes, seconds. Default: 1.
+    #[serde(default = "one_f64")]
+    pub(crate) over_s: f64,
+    /// How high it is lifted on the way, metres. Default: 0.1.
+    #[serde(default = "lift")]
+    pub(crate) lift_m: f64,
+}
+
+/// How the outcome is judged, over the world's true state after every physics step.
+///
+/// Variables: for every object without `count`: `NAME_x`, `NAME_y`, `NAME_z` (base frame, metres), `NAME_speed`
+/// (m/s), `NAME_spin` (rad/s), `NAME_tilt` (rad from upright), `NAME_moved` (metres from its start), `NAME_touched`
+/// (pads in contact with it); for buttons `NAME_pressed` (1 or 0), `NAME_presses` (count), `NAME_depth` (metres);
+/// `PLACE_x`, `PLACE_y`, `PLACE_z`; `others_moved` (metres, the most that any object not listed in `moves` has
+/// moved); `commanded_opening` (share of the largest), `pad_contact` (pads in contact with anything, 0-2), `tcp_x`,
+/// `tcp_y`, `tcp_z`, `time` (seconds); plain draws under their names.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct RawJudge {
+    /// Names of the objects that the task is to move; all others are bystanders.
+    #[serde(default)]
+    pub(crate) moves: Vec<String>,
+    /// The predicate that decides.
+    pub(crate) strict: RawPredicate,
+    /// The predicate as published elsewhere, for comparison.
+    #[serde(default)]
+    pub(crate) faithful: Option<RawPredicate>,
+}
+
+/// Stages that must be reached in their order, and what must never happen.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct RawPredicate {
+    /// The stages.
+    pub(crate) stage: Vec<RawStage>,
+    /// What makes the episode a failure for good.
+    #[serde(default)]
+    pub(crate) violation: Vec<RawViolation>,
+}
+
+/// A stage, reached for good once its condition has held for some time.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct RawStage {
+    /// Name.
+    pub(crate) name: String,
+    /// Condition.
+    pub(crate) when: String,
+    /// How long it must hold without a break, seconds. Default: 0, one physics step.
+    #[serde(default)]
+    pub(crate) hold_s: f64,
+    /// Whether it must hold when the outcome is read; reached before and lost does not count. Only the last stage
+    /// may ask for it. Default: false.
+    #[serde(default)]
+    pub(crate) at_end: bool,
+}
+
+/// Something that must not happen.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct RawViolation {
+    /// What happened, in words.
+    pub(crate) name: String,
+    /// Condition.
+    pub(crate) when: String,
+    /// Counts only until this stage is reached.
+    #[serde(default)]
+    pub(crate) before: Option<String>,
+}
+
+fn half() -> f64 {
+    0.5
+}
+fn width() -> u32 {
+    640
+}
+fn height() -> u32 {
+    480
+}
+fn depth_min() -> f64 {
+    0.2
+}
+fn depth_max() -> f64 {
+    6.0
+}
+fn d435() -> String {
+    "d435".into()
+}
+fn attempts() -> u32 {
+    1000
+}
+fn zero() -> Number {
+    Number::Plain(0.0)
+}
+fn one() -> Number {
+    Number::Plain(1.0)
+}
+fn third() -> f64 {
+    0.3
+}
+fn jitter() -> f64 {
+    0.0015
+}
+fn bevel() -> f64 {
+    0.001
+}
+fn one_f64() -> f64 {
+    1.0
+}
+fn lift() -> f64 {
+    0.1
+}

@@ -1,0 +1,133 @@
+//! The meaning of a scenario file: what the simulator builds, what the judge decides, what the agent is told.
+
+use super::raw::{Color, RawPerturb};
+use crate::{
+    model::ObjectModel,
+    random::{DrawSpec, StreamKind},
+};
+use acm_concept::{camera::CameraModel, expression::Expression, task::Budgets};
+use acm_render::Lighting;
+use glam::DVec3;
+
+/// What the simulator builds.
+#[derive(Debug, Clone)]
+pub(crate) struct WorldSpec {
+    pub(crate) surfaces: Vec<SurfaceSpec>,
+    pub(crate) lighting: Lighting,
+    pub(crate) cameras: Vec<CameraSpec>,
+    pub(crate) home: DVec3,
+    pub(crate) workspace: [DVec3; 2],
+    pub(crate) stream: StreamKind,
+    pub(crate) attempts: u32,
+    pub(crate) draws: Vec<DrawSpec>,
+    pub(crate) rejects: Vec<RejectSpec>,
+    pub(crate) objects: Vec<ObjectSpec>,
+    pub(crate) places: Vec<PlaceSpec>,
+    pub(crate) events: Vec<EventSpec>,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct SurfaceSpec {
+    pub(crate) name: String,
+    pub(crate) size: DVec3,
+    pub(crate) position: DVec3,
+    pub(crate) color: Color,
+    pub(crate) friction: f64,
+    pub(crate) support: bool,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct CameraSpec {
+    /// Nominal calibration.
+    pub(crate) model: CameraModel,
+    pub(crate) sensor: String,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct RejectSpec {
+    pub(crate) between: [String; 2],
+    pub(crate) nearer_than_m: f64,
+    /// Index of the first draw that is drawn anew.
+    pub(crate) redraw_from: usize,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct ObjectSpec {
+    pub(crate) name: String,
+    pub(crate) model: ObjectModel,
+    pub(crate) count: Option<Expression>,
+    pub(crate) position: [Expression; 3],
+    pub(crate) yaw: Expression,
+    pub(crate) on: Option<Reference>,
+    pub(crate) perturb: Option<RawPerturb>,
+}
+
+/// A copy of an object; the index is `None` for one that has no copies.
+#[derive(Debug, Clone)]
+pub(crate) struct Reference {
+    pub(crate) object: String,
+    pub(crate) index: Option<Expression>,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct PlaceSpec {
+    pub(crate) name: String,
+    pub(crate) at: PlaceAt,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) enum PlaceAt {
+    Object(Reference),
+    CentroidOf(String),
+    Position([Expression; 3]),
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct EventSpec {
+    pub(crate) name: String,
+    pub(crate) after_s: f64,
+    pub(crate) when: Option<Expression>,
+    pub(crate) carry: Reference,
+    pub(crate) to: [Expression; 3],
+    pub(crate) yaw: Expression,
+    pub(crate) over_s: f64,
+    pub(crate) lift_m: f64,
+}
+
+/// What the judge decides.
+#[derive(Debug, Clone)]
+pub(crate) struct JudgeSpec {
+    pub(crate) moves: Vec<String>,
+    pub(crate) strict: PredicateSpec,
+    pub(crate) faithful: Option<PredicateSpec>,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct PredicateSpec {
+    pub(crate) stages: Vec<StageSpec>,
+    pub(crate) violations: Vec<ViolationSpec>,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct StageSpec {
+    pub(crate) name: String,
+    pub(crate) when: Expression,
+    pub(crate) hold_s: f64,
+    pub(crate) at_end: bool,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct ViolationSpec {
+    pub(crate) name: String,
+    pub(crate) when: Expression,
+    /// Index of the stage until which it counts.
+    pub(crate) before: Option<usize>,
+}
+
+/// What the agent is told, but for the cameras.
+#[derive(Debug, Clone)]
+pub(crate) struct TaskTemplate {
+    pub(crate) instruction: String,
+    pub(crate) instruction_at_s: f64,
+    pub(crate) budgets: Budgets,
+}

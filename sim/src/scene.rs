@@ -1,0 +1,192 @@
+//! The world as a scene for the renderer.
+
+use crate::{convert::from_engine, layout::BuiltSolid, world::World};
+use acm_concept::{pose::Pose, solid::Solid};
+use acm_render::{Instance, Lighting, Material, Mesh, MeshError, Scene};
+use glam::{DVec3, Vec3};
+use std::sync::Arc;
+
+const BACKGROUND: [u8; 3] = [200, 200, 205];
+const HAND_COLOR: [u8; 3] = [235, 235, 235];
+const FINGER_COLOR: [u8; 3] = [60, 60, 66];
+
+/// Meshes and constant parts of a world's scene.
+#[derive(Debug)]
+pub(crate) struct Stage {
+    lighting: Lighting,
+    cuboid: Arc<Mesh>,
+    cylinder: Arc<Mesh>,
+    /// A bevelled box has its own mesh, because scaling would distort the bevel: object, solid, mesh.
+    bevelled: Vec<(usize, usize, Arc<Mesh>)>,
+}
+
+impl Stage {
+    pub(crate) fn new(world: &World, lighting: &Lighting) -> Result<Stage, MeshError> {
+        let mut bevelled = Vec::new();
+        for (object, body) in world.bodies.iter().enumerate() {
+            for (index, built) in body.placed.solids.iter().enumerate() {
+                if let (Solid::Box { size }, true) = (built.placed.solid, built.bevel_m > 0.0) {
+                    bevelled.push((object, index, Arc::new(bevelled_box(size, built.bevel_m)?)));
+                }
+            }
+        }
+        let (cuboid, cylinder) = (Arc::new(Mesh::unit_box()), Arc::new(Mesh::unit_cylinder()));
+        Ok(Stage { lighting: lighting.clone(), cuboid, cylinder, bevelled })
+    }
+
+    /// The scene as the world stands now.
+    pub(crate) fn scene(&self, world: &World) -> Scene {
+        let mut scene = Scene { instances: Vec::new(), lights: self.lighting.clone(), background: BACKGROUND };
+        let ids = Ids::of(world);
+        for (index, (_, surface)) in world.surfaces.iter().enumerate() {
+            let solid = Solid::Box { size: surface.size };
+            let pose = Pose::from_translation(surface.position);
+            scene.instances.push(self.instance(&solid, pose, surface.color.0, ids.surface(index)));
+        }
+        for (index, body) in world.bodies.iter().enumerate() {
+            let pose = body.pose(&world.physics);
+            for (place, built) in body.placed.solids.iter().enumerate() {
+                scene.instances.push(self.built(index, place, built, pose, ids.object(index)));
+            }
+            let cap = body.cap_pose(&world.physics).unwrap_or(pose);
+            for built in &body.placed.cap {
+                let pose = cap * built.placed.pose;
+                scene.instances.push(self.instance(&built.placed.solid, pose, built.color, ids.object(index)));
+            }
+        }
+        self.add_hand(world, &mut scene, ids.hand());
+        scene
+    }
+
+    fn add_hand(&self, world: &World, scene: &mut Scene, id: u32) {
+        let tcp = world.gripper.tcp(&world.physics);
+        for part in &world.robot.hand {
+            scene.instances.push(self.instance(&part.solid, tcp * part.pose, HAND_COLOR, id));
+        }
+        let mirror = Pose::from_yaw(DVec3::ZERO, std::f64::consts::PI);
+        for (frame, turn) in world.gripper.finger_poses(&world.physics).into_iter().zip([Pose::IDENTITY, mirror]) {
+            for part in &world.robot.finger {
+                scene.instances.push(self.instance(&part.solid, frame * turn * part.pose, FINGER_COLOR, id));
+            }
+        }
+    }
+
+    fn built(&self, object: usize, place: usize, built: &BuiltSolid, body: Pose, id: u32) -> Instance {
+        let pose = body * built.placed.pose;
+        match self.bevelled.iter().find(|(o, p, _)| (*o, *p) == (object, place)) {
+            Some((_, _, mesh)) => {
+                let material = Material::plain(built.color);
+                Instance { mesh: mesh.clone(), pose, scale: DVec3::ONE, material, id }
+            }
+            None => self.instance(&built.placed.solid, pose, built.color, id),
+        }
+    }
+
+    fn instance(&self, solid: &Solid, pose: Pose, color: [u8; 3], id: u32) -> Instance {
+        let (mesh, scale) = match *solid {
+            Solid::Box { size } => (&self.cuboid, size),
+            Solid::Cylinder { radius, height } => (&self.cylinder, DVec3::new(radius, radius, height)),
+        };
+        Instance { mesh: mesh.clone(), pose, scale, material: Material::plain(color), id }
+    }
+}
+
+/// Numbers of what can be seen: surfaces first, then objects, then the hand.
+pub(crate) struct Ids {
+    surfaces: u32,
+    objects: u32,
+}
+
+impl Ids {
+    pub(crate) fn of(world: &World) -> Ids {
+        Ids { surfaces: world.surfaces.len() as u32, objects: world.bodies.len() as u32 }
+    }
+    fn surface(&self, index: usize) -> u32 {
+        1 + index as u32
+    }
+    fn object(&self, index: usize) -> u32 {
+        1 + self.surfaces + index as u32
+    }
+    fn hand(&self) -> u32 {
+        1 + self.surfaces + self.objects
+    }
+    pub(crate) fn legend(&self, world: &World) -> Vec<(u32, String)> {
+        let surfaces = world.surfaces.iter().enumerate().map(|(i, (_, s))| (self.surface(i), s.name.clone()));
+        let objects = world.bodies.iter().enumerate().map(|(i, b)| (self.object(i), b.placed.name.clone()));
+        surfaces.chain(objects).chain([(self.hand(), "hand".to_string())]).collect()
+    }
+}
+
+/// A box whose edges are cut at 45 degrees, `bevel` metres wide along each face. Metres.
+fn bevelled_box(size: DVec3, bevel: f64) -> Result<Mesh, MeshError> {
+    let half = (size * 0.5).as_vec3();
+    let inner = half - Vec3::splat(bevel as f32);
+    // Each corner of the box becomes three: one on each face that meets there.
+    let sign = |corner: usize, axis: usize| if corner >> axis & 1 == 1 { 1.0 } else { -1.0 };
+    let vertex = |corner: usize, face: usize| (3 * corner + face) as u32;
+    let mut positions = Vec::new();
+    for corner in 0..8 {
+        for face in 0..3 {
+            let reach = |axis: usize| sign(corner, axis) * if axis == face { half[axis] } else { inner[axis] };
+            positions.push(Vec3::new(reach(0), reach(1), reach(2)));
+        }
+    }
+    let mut triangles = Vec::new();
+    let mut quad = |corners: [u32; 4]| add_outward(&positions, &mut triangles, &corners);
+    for axis in 0..3 {
+        let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+        for side in 0..2 {
+            let at = |a: usize, b: usize| side << axis | a << u | b << v;
+            quad([(0, 0), (1, 0), (1, 1), (0, 1)].map(|(a, b)| vertex(at(a, b), axis)));
+            // The edge along `axis` at one corner of the other two axes, once for each of its four places.
+            for other in 0..2 {
+                let [from, to] = [0, 1].map(|end| end << axis | side << u | other << v);
+                quad([vertex(from, u), vertex(to, u), vertex(to, v), vertex(from, v)]);
+            }
+        }
+    }
+    for corner in 0..8 {
+        add_outward(&positions, &mut triangles, &[0, 1, 2].map(|face| vertex(corner, face)));
+    }
+    Mesh::from_triangles("bevelled box", &positions, &triangles)
+}
+
+/// Adds a flat convex polygon as triangles that look away from the origin.
+fn add_outward(positions: &[Vec3], triangles: &mut Vec<[u32; 3]>, corners: &[u32]) {
+    let point = |index: u32| positions[index as usize];
+    for step in 1..corners.len() - 1 {
+        let [a, b, c] = [corners[0], corners[step], corners[step + 1]];
+        let normal = (point(b) - point(a)).cross(point(c) - point(a));
+        triangles.push(if normal.dot(point(a)) > 0.0 { [a, b, c] } else { [a, c, b] });
+    }
+}
+
+/// Poses of every body, for comparing worlds bit by bit.
+pub(crate) fn state_hash(world: &World) -> u64 {
+    let bytes = world.physics.bodies.iter().flat_map(|(_, body)| {
+        let pose = from_engine(body.position());
+        let numbers = pose.translation.to_array().into_iter().chain(pose.rotation.to_array());
+        numbers.flat_map(|number| number.to_bits().to_le_bytes()).collect::<Vec<u8>>()
+    });
+    fnv(bytes)
+}
+
+/// FNV-1a, 64 bits.
+pub(crate) fn fnv(bytes: impl Iterator<Item = u8>) -> u64 {
+    bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+    use super::*;
+
+    #[test]
+    fn a_bevelled_box_is_closed_and_keeps_its_size() {
+        let mesh = bevelled_box(DVec3::new(0.04, 0.05, 0.03), 0.002).unwrap();
+        let (low, high) = mesh.bounds();
+        assert!((high - low - Vec3::new(0.04, 0.05, 0.03)).length() < 1e-6);
+        assert!(mesh.is_closed());
+        assert_eq!(mesh.triangle_count(), 6 * 2 + 12 * 2 + 8);
+    }
+}
