@@ -383,3 +383,22 @@ fn frame_raw(lights: &Lighting, camera: &CameraModel, camera_from_world: &Pose, 
         misc: [lights.ambient, lights.points.len() as f32, offset, has_shadow],
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_machine_without_drivers_learns_what_to_install() {
+        let message = RendererError::NoAdapter { tried: "nothing found".into() }.to_string();
+        for package in ["libegl1", "libegl-mesa0", "libgl1-mesa-dri", "mesa-vulkan-drivers"] {
+            assert!(message.contains(package), "{message}");
+        }
+    }
+
+    #[test]
+    fn a_renderer_can_move_to_another_thread() {
+        fn assert_send<T: Send>() {}
+        assert_send::<Renderer>();
+    }
+}

@@ -93,7 +93,7 @@ impl Targets {
 
     /// Waits for the recorded copies and takes the pixels out.
     pub(crate) fn read(&self, device: &wgpu::Device) -> Result<Rendered, RenderError> {
-        let (sender, receiver) = mpsc::channel();
+        let (sender, receiver) = mpsc::sync_channel(1);
         self.readback.map_async(wgpu::MapMode::Read, .., move |result| {
             // The receiver lives until the poll below returns; without it nobody waits for the answer.
             drop(sender.send(result));
