@@ -1,16 +1,90 @@
 //! From an instruction to a [`Task`].
+//!
+//! Words are cut ([`token`]), phrases and clauses are read by forms from the lexicon with bounded backtracking,
+//! the longest reading first ([`reader`], [`phrase`], [`clause`]), and references are joined ([`interpret`]).
 
+mod clause;
 mod error;
+mod interpret;
+mod phrase;
+mod reader;
+mod token;
 
+pub use clause::MAX_CLAUSES;
 pub use error::ParseError;
+pub use token::{MAX_BYTES, MAX_TOKENS};
 
 use crate::{lexicon::Lexicon, task::Task};
 use acm_concept::template::TemplateLibrary;
+use reader::{Expected, Reader};
+use token::Token;
 
-pub(crate) fn parse(_lexicon: &Lexicon, _library: &TemplateLibrary, text: &str) -> Result<Task, ParseError> {
-    Err(ParseError::Unsupported {
-        text: text.into(),
-        span: crate::task::Span { start: 0, end: text.len() },
-        reason: "the front end is not part of this version".into(),
-    })
+/// Reads an instruction with the nouns and functions of a library.
+pub(crate) fn parse(lexicon: &Lexicon, library: &TemplateLibrary, text: &str) -> Result<Task, ParseError> {
+    let tokens = without_ignored(lexicon, library, token::tokenize(text)?);
+    if tokens.iter().all(|token| token.stop) {
+        return Err(ParseError::Empty);
+    }
+    let reader = Reader::new(lexicon, library, &tokens);
+    let statements = reader.statements().ok_or_else(|| report(&reader, text))?;
+    if statements.len() > MAX_CLAUSES {
+        return Err(ParseError::TooLong { unit: "clauses", length: statements.len(), limit: MAX_CLAUSES });
+    }
+    interpret::interpret(library, text, &statements)
+}
+
+/// Drops words that say nothing here ("please", "carefully").
+fn without_ignored(lexicon: &Lexicon, library: &TemplateLibrary, tokens: Vec<Token>) -> Vec<Token> {
+    let kept = {
+        let reader = Reader::new(lexicon, library, &tokens);
+        let mut kept = Vec::with_capacity(tokens.len());
+        let mut at = 0;
+        while at < tokens.len() {
+            match reader.longest(at, &lexicon.words.ignored) {
+                Some(end) => at = end,
+                None => {
+                    kept.push(at);
+                    at += 1;
+                }
+            }
+        }
+        kept
+    };
+    let mut keep = kept.into_iter().peekable();
+    let chosen = |(at, _): &(usize, Token)| keep.next_if_eq(at).is_some();
+    tokens.into_iter().enumerate().filter(chosen).map(|(_, token)| token).collect()
+}
+
+/// The farthest failure as an error.
+fn report(reader: &Reader<'_>, text: &str) -> ParseError {
+    let failure = reader.failure().unwrap_or(reader::Failure { at: 0, expected: Expected::Verb });
+    let at = failure.at.min(reader.tokens.len().saturating_sub(1));
+    // The span goes on over the unknown words that follow: "the coffee machine".
+    let unknown = |place: usize| reader.word(place).is_some_and(|word| !reader.lexicon.known_words.contains(word));
+    let mut end = at + 1;
+    while failure.expected == Expected::Noun && unknown(end) && reader.noun(end).is_none() {
+        end += 1;
+    }
+    let span = reader.span(at, end);
+    let words = span.of(text).to_owned();
+    if reader.exhausted() {
+        let reason = "the sentence has too many readings: use shorter clauses".to_owned();
+        return ParseError::Unreadable { text: words, span, reason };
+    }
+    match failure.expected {
+        Expected::Noun => {
+            let known = reader.nouns.iter().copied().collect::<Vec<_>>().join(", ");
+            ParseError::UnknownNoun { text: words, span, known }
+        }
+        Expected::Verb => {
+            let mut verbs: Vec<&str> = reader.lexicon.frames.iter().map(|frame| frame.name.as_str()).collect();
+            verbs.dedup();
+            let reason = format!("no known kind of request begins here; I know: {}", verbs.join(", "));
+            ParseError::Unreadable { text: words, span, reason }
+        }
+        Expected::Other(what) if failure.at >= reader.tokens.len() => {
+            ParseError::Unreadable { text: words, span, reason: format!("it ends where I expected {what}") }
+        }
+        Expected::Other(what) => ParseError::Unreadable { text: words, span, reason: format!("I expected {what}") },
+    }
 }

@@ -1,0 +1,213 @@
+//! Matching of word classes and forms against the tokens, with the farthest failure kept for the report.
+
+use super::{
+    phrase::{NounPhrase, PlacePhrase},
+    token::Token,
+};
+use crate::{
+    lexicon::{Element, Form, Lexicon, Slot},
+    task::Span,
+};
+use acm_concept::template::TemplateLibrary;
+use std::{
+    cell::{Cell, RefCell},
+    collections::BTreeSet,
+};
+
+/// Element matches that one instruction may cost: text that is so ambiguous is refused.
+const BUDGET: u32 = 400_000;
+/// Readings of one phrase that are kept.
+pub(super) const MAX_READINGS: usize = 24;
+
+/// What was expected where the reading stopped.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Expected {
+    /// A noun of the library.
+    Noun,
+    /// A verb.
+    Verb,
+    /// Something else, in words.
+    Other(&'static str),
+}
+
+/// A failure at a token.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Failure {
+    pub at: usize,
+    pub expected: Expected,
+}
+
+/// What the slots of a form were filled with.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct Captures {
+    pub object: Option<NounPhrase>,
+    /// The object was named before the verb: its slot takes no words.
+    pub object_given: bool,
+    pub place: Option<PlacePhrase>,
+    pub times: Option<u32>,
+    pub it: Option<NounPhrase>,
+}
+
+/// Reads phrases from the tokens of one instruction.
+pub(super) struct Reader<'a> {
+    pub lexicon: &'a Lexicon,
+    pub library: &'a TemplateLibrary,
+    pub tokens: &'a [Token],
+    pub nouns: BTreeSet<&'a str>,
+    spent: Cell<u32>,
+    failure: RefCell<Option<Failure>>,
+}
+
+impl<'a> Reader<'a> {
+    pub fn new(lexicon: &'a Lexicon, library: &'a TemplateLibrary, tokens: &'a [Token]) -> Reader<'a> {
+        let nouns = library.iter().flat_map(|t| t.synopsis.nouns.iter().map(|noun| noun.noun.as_str())).collect();
+        Reader { lexicon, library, tokens, nouns, spent: Cell::new(0), failure: RefCell::new(None) }
+    }
+    /// Whether the budget is used up.
+    pub fn exhausted(&self) -> bool {
+        self.spent.get() >= BUDGET
+    }
+    pub fn spend(&self) -> bool {
+        self.spent.set(self.spent.get().saturating_add(1));
+        !self.exhausted()
+    }
+    /// Remembers a failure if it lies farther on than the last; an unknown noun outweighs others at its place.
+    pub fn fail(&self, at: usize, expected: Expected) {
+        let mut failure = self.failure.borrow_mut();
+        let better = match &*failure {
+            None => true,
+            Some(last) => at > last.at || (at == last.at && expected == Expected::Noun),
+        };
+        if better {
+            *failure = Some(Failure { at, expected });
+        }
+    }
+    /// Remembers a failure unless one lies farther on.
+    pub fn insist(&self, at: usize, expected: Expected) {
+        let mut failure = self.failure.borrow_mut();
+        if failure.as_ref().is_none_or(|last| last.at <= at) {
+            *failure = Some(Failure { at, expected });
+        }
+    }
+    pub fn failure(&self) -> Option<Failure> {
+        self.failure.borrow().clone()
+    }
+    /// The word at a place; `None` for a stop or the end.
+    pub fn word(&self, at: usize) -> Option<&str> {
+        self.tokens.get(at).filter(|token| !token.stop).map(|token| token.text.as_str())
+    }
+    pub fn is_word(&self, at: usize, word: &str) -> bool {
+        self.word(at) == Some(word)
+    }
+    pub fn is_stop(&self, at: usize) -> bool {
+        self.tokens.get(at).is_some_and(|token| token.stop)
+    }
+    /// The characters that the tokens `start..end` cover.
+    pub fn span(&self, start: usize, end: usize) -> Span {
+        let last = end.max(start + 1) - 1;
+        let fallback = self.tokens.last().map_or(Span { start: 0, end: 0 }, |token| token.span);
+        let get = |at: usize| self.tokens.get(at).map_or(fallback, |token| token.span);
+        get(start).join(get(last))
+    }
+    /// Ends of all readings of a word class at `at`, the longest first.
+    pub fn class(&self, at: usize, forms: &[Form]) -> Vec<usize> {
+        let mut ends: Vec<usize> = forms.iter().flat_map(|form| self.words(at, form)).filter(|&end| end > at).collect();
+        ends.sort_unstable_by(|a, b| b.cmp(a));
+        ends.dedup();
+        ends
+    }
+    /// End of the longest reading of a word class.
+    pub fn longest(&self, at: usize, forms: &[Form]) -> Option<usize> {
+        self.class(at, forms).first().copied()
+    }
+    /// The longest reading of classes with a meaning each.
+    pub fn meaning<T: Copy>(&self, at: usize, classes: &[(T, Vec<Form>)]) -> Option<(T, usize)> {
+        let readings = classes.iter().filter_map(|(meaning, forms)| Some((*meaning, self.longest(at, forms)?)));
+        readings.max_by_key(|(_, end)| *end)
+    }
+    /// The longest reading of a number word.
+    pub fn number(&self, at: usize, numbers: &[(u32, Form)]) -> Option<(u32, usize)> {
+        let readings = numbers.iter().flat_map(|(number, form)| self.words(at, form).into_iter().map(|e| (*number, e)));
+        readings.filter(|(_, end)| *end > at).max_by_key(|(_, end)| *end)
+    }
+    fn words(&self, at: usize, form: &[Element]) -> Vec<usize> {
+        self.form(at, form, &Captures::default(), 0).into_iter().map(|(_, end)| end).collect()
+    }
+    /// All readings of a form at `at` with what its slots hold, in the order of preference.
+    pub fn form(&self, at: usize, form: &[Element], captures: &Captures, depth: u32) -> Vec<(Captures, usize)> {
+        let Some((element, rest)) = form.split_first() else { return vec![(captures.clone(), at)] };
+        if !self.spend() {
+            return Vec::new();
+        }
+        let (mut readings, optional) = match element {
+            Element::Words { any, optional } => {
+                let matches = self.word(at).is_some_and(|word| any.iter().any(|known| known == word));
+                (if matches { self.form(at + 1, rest, captures, depth) } else { Vec::new() }, *optional)
+            }
+            Element::Slot { slot, optional } => {
+                let filled = self.fill(at, *slot, captures, depth);
+                let followed = filled.into_iter().flat_map(|(captures, end)| self.form(end, rest, &captures, depth));
+                (followed.take(MAX_READINGS).collect(), *optional)
+            }
+        };
+        if optional {
+            readings.extend(self.form(at, rest, captures, depth));
+        }
+        readings.truncate(MAX_READINGS);
+        readings
+    }
+    fn fill(&self, at: usize, slot: Slot, captures: &Captures, depth: u32) -> Vec<(Captures, usize)> {
+        let with = |change: &dyn Fn(&mut Captures), end: usize| {
+            let mut captures = captures.clone();
+            change(&mut captures);
+            (captures, end)
+        };
+        match slot {
+            Slot::Object if captures.object_given => vec![(captures.clone(), at)],
+            Slot::Object => {
+                let phrases = self.noun_phrases(at, depth).into_iter();
+                phrases.map(|(phrase, end)| with(&|c| c.object = Some(phrase.clone()), end)).collect()
+            }
+            Slot::Place => {
+                let places = self.places(at, depth).into_iter();
+                places.map(|(place, end)| with(&|c| c.place = Some(place.clone()), end)).collect()
+            }
+            Slot::Thing => {
+                let places = self.bare_places(at, depth).into_iter();
+                places.map(|(place, end)| with(&|c| c.place = Some(place.clone()), end)).collect()
+            }
+            Slot::Times if captures.times.is_some() => Vec::new(),
+            Slot::Times => {
+                let times = self.number(at, &self.lexicon.times).into_iter();
+                times.map(|(times, end)| with(&|c| c.times = Some(times), end)).collect()
+            }
+            Slot::It => {
+                let phrases = self.noun_phrases(at, depth + 1).into_iter().filter(|(p, _)| p.located.is_none());
+                phrases.map(|(phrase, end)| with(&|c| c.it = Some(phrase.clone()), end)).collect()
+            }
+            Slot::Its | Slot::Genitive => {
+                let owners = self.genitives(at, slot == Slot::Its, depth).into_iter();
+                owners.map(|(owner, end)| with(&|c| c.it = owner.clone(), end)).collect()
+            }
+            Slot::Spot => self.spots(at).into_iter().map(|end| (captures.clone(), end)).collect(),
+        }
+    }
+    /// "its" or "the cube's"; with `article` also "the".
+    fn genitives(&self, at: usize, article: bool, depth: u32) -> Vec<(Option<NounPhrase>, usize)> {
+        let mut owners = Vec::new();
+        if self.is_word(at, "its") || (article && self.is_word(at, "the")) {
+            owners.push((None, at + 1));
+        }
+        for (phrase, end) in self.noun_phrases(at, depth + 1) {
+            if self.is_word(end, "'s") && phrase.located.is_none() {
+                owners.push((Some(phrase), end + 1));
+            }
+        }
+        owners
+    }
+    fn spots(&self, at: usize) -> Vec<usize> {
+        let mut ends = self.class(at, &self.lexicon.words.places);
+        ends.extend(self.noun(at).map(|noun| noun.end));
+        ends
+    }
+}
