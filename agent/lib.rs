@@ -1,1 +1,24 @@
-//! Composition of the ACM agent.
+//! Composition of ACM: the only place that names both the agent and the simulator.
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`cli`] | the command line and its exit codes |
+//! | [`episode`] | one episode: simulator, agent, judge |
+//! | [`run`] | `acm run`: one episode told, or a range of seeds counted |
+//! | [`inject`] | faults that can be put between the agent and its world |
+//! | [`narrate`] | the story of an episode, told from its messages |
+//! | [`demo`] | `acm demo`: the first minute |
+//! | [`perceive`] | `acm perceive`: real frames, no simulator |
+//! | [`scenario`], [`doctor`] | `acm scenario`, `acm doctor` |
+//! | [`statistics`] | proportions with intervals |
+
+pub mod cli;
+pub mod demo;
+pub mod doctor;
+pub mod episode;
+pub mod inject;
+pub mod narrate;
+pub mod perceive;
+pub mod run;
+pub mod scenario;
+pub mod statistics;

@@ -6,8 +6,10 @@
 //! | `licences` | that everything we build on fits Apache-2.0 OR MIT |
 //! | `names` | that the agent's source names no scenario and no object of the simulator |
 //! | `invariants` | that each proof which ARCHITECTURE.md names is a test that exists |
+//! | `guides` | that the examples and tables of docs/ are true |
 
 mod arrows;
+mod guides;
 mod invariants;
 mod licences;
 mod names;

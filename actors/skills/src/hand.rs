@@ -34,7 +34,7 @@ pub(crate) struct Hand {
 impl Hand {
     /// Begins where the hand is and takes the force it feels now as its baseline.
     pub fn new(robot: &RobotDescription, feedback: &Feedback) -> Hand {
-        Hand {
+        let mut hand = Hand {
             command: Command {
                 tcp: feedback.tcp,
                 opening_m: feedback.commanded_opening_m.clamp(0.0, robot.max_opening_m),
@@ -44,7 +44,18 @@ impl Hand {
             filtered_n: feedback.wrist_force_n,
             baseline_n: feedback.wrist_force_n,
             robot: robot.clone(),
-        }
+        };
+        // A yielding wrist may be measured a hair outside the box in which commands are taken.
+        hand.command.tcp.translation = hand.inside(feedback.tcp.translation);
+        hand
+    }
+    /// The command to send. Interpolation may leave the workspace by a rounding error; robots refuse even that.
+    pub fn command(&self) -> Command {
+        let tcp = Pose::new(self.inside(self.command.tcp.translation), self.command.tcp.rotation);
+        Command { tcp, ..self.command }
+    }
+    fn inside(&self, position: DVec3) -> DVec3 {
+        position.max(self.robot.workspace_min).min(self.robot.workspace_max)
     }
     /// Takes a new reading into the filter.
     pub fn observe(&mut self, feedback: &Feedback) {

@@ -88,7 +88,7 @@ impl Retreat {
         }
         if let Some(next) = self.path.advance() {
             self.hand.command.tcp = next;
-            return RetreatTick::Act(self.hand.command);
+            return RetreatTick::Act(self.hand.command());
         }
         let distance_m = feedback.tcp.translation.distance(self.path.end().translation);
         if distance_m < THERE_M {
@@ -99,7 +99,7 @@ impl Retreat {
         if self.settle_ticks > self.hand.ticks(SETTLE_S) {
             return self.finish(feedback, Some(format!("came to rest {:.1} mm from home", 1e3 * distance_m)));
         }
-        RetreatTick::Act(self.hand.command)
+        RetreatTick::Act(self.hand.command())
     }
 
     fn finish(&mut self, feedback: &Feedback, failure: Option<String>) -> RetreatTick {

@@ -120,7 +120,7 @@ impl<F: Function> Run<F> {
                     running.primitive.tick(&mut self.hand, feedback)
                 };
                 match step {
-                    Step::Act => return Tick::Act(self.hand.command),
+                    Step::Act => return Tick::Act(self.hand.command()),
                     Step::Done(outcome) => {
                         self.close_primitive(feedback, None);
                         last = Some(outcome);
@@ -167,7 +167,7 @@ impl<F: Function> Run<F> {
         match self.withdrawal.as_mut().and_then(Path::advance) {
             Some(next) => {
                 self.hand.command.tcp = next;
-                Tick::Act(self.hand.command)
+                Tick::Act(self.hand.command())
             }
             None => self.finish(feedback),
         }

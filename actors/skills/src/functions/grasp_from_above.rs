@@ -3,9 +3,9 @@
 //! Arguments: `grip_width`, the distance between the faces across the frame's y axis; optionally `cross_width`,
 //! the same across its x axis; `height`, the part's height over its base. Metres.
 
-use super::{GUARD_M, PERCEPTION_ERROR_M, ROOMY_M, argument, require_empty_hand, within_ceiling};
+use super::{PERCEPTION_ERROR_M, ROOMY_M, argument, require_empty_hand, within_ceiling};
 use crate::{
-    clearance::{approach_clearance, obstacles, safe_height, within_reach},
+    clearance::{GUARD_M, SAFETY_M, approach_clearance, obstacles, safe_height, within_guarded_reach, within_reach},
     controller::StartError,
     geometry::{downward, nearest_heading},
     hand::Hand,
@@ -81,7 +81,7 @@ impl GraspFromAbove {
         let top_m = (base.translation.z + height_m).max(frame.translation.z);
         let grip_height_m = grip_height(hand, frame.translation.z, support_m, invocation.attempt);
         let at = frame.translation.with_z(grip_height_m);
-        within_reach(&hand.robot, "the grasp", at)?;
+        within_guarded_reach(&hand.robot, "the grasp", at)?;
         let obstacles = obstacles(invocation, support_m);
         let approach = choose_approach(invocation, hand, at, &obstacles)?;
         let pre_height_m = (top_m + hand.tip_reach_m + GUARD_M).max(grip_height_m + GUARD_M);
@@ -89,8 +89,10 @@ impl GraspFromAbove {
         let start = hand.command.tcp.translation;
         let travel_height_m = safe_height(hand, start, at, &obstacles, top_m, 0.0)?;
         let below_m = grip_height_m - support_m + GUARD_M;
-        let carry_height_m =
-            safe_height(hand, at, at, &obstacles, support_m, below_m)?.max(grip_height_m + 2.0 * TUG_M);
+        let lift_height_m = safe_height(hand, at, at, &obstacles, support_m, below_m)?;
+        // A failed grasp leaves the part standing: the empty fingers must clear its top as well.
+        let above_top_m = top_m + hand.tip_reach_m + SAFETY_M;
+        let carry_height_m = lift_height_m.max(above_top_m).max(grip_height_m + 2.0 * TUG_M);
         Ok(GraspFromAbove {
             object: invocation.part.object,
             base: Pose::from_yaw(base.translation.with_z(support_m), base.yaw()),

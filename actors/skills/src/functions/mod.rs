@@ -14,9 +14,6 @@ use acm_concept::{embodiment::Feedback, skill::SkillInvocation};
 pub(crate) const ROOMY_M: f64 = 0.005;
 /// How far perceived geometry may be off: an overlap up to this is tried, carefully; metres.
 pub(crate) const PERCEPTION_ERROR_M: f64 = 0.008;
-/// Height above the perceived contact from which the hand goes down guardedly, metres. Covers the error of
-/// perceived heights, which is up to 15 mm with a biased depth camera.
-pub(crate) const GUARD_M: f64 = 0.02;
 
 /// A named argument that must be finite and positive.
 pub(crate) fn argument(invocation: &SkillInvocation, name: &'static str) -> Result<f64, StartError> {

@@ -2,10 +2,12 @@
 //!
 //! The invocation says how what is held sits in the hand and where its base shall be. The height is found by
 //! feeling: perceived heights may be off, the wrist knows when something stands.
+//!
+//! Argument: `height`, of what is held over its base, which the hand clears when it leaves; metres.
 
-use super::{GUARD_M, PERCEPTION_ERROR_M, within_ceiling};
+use super::{PERCEPTION_ERROR_M, argument, within_ceiling};
 use crate::{
-    clearance::{approach_clearance, obstacles, safe_height, within_reach},
+    clearance::{GUARD_M, SAFETY_M, approach_clearance, obstacles, safe_height, within_guarded_reach, within_reach},
     controller::StartError,
     geometry::{downward, points_down},
     hand::{Hand, holds_something},
@@ -50,6 +52,7 @@ pub(crate) struct PlaceUpright {
     contact: Pose,
     obstacles: Vec<PlacedSolid>,
     travel_height_m: f64,
+    leave_height_m: f64,
     gap_m: f64,
     /// The opening kept until the hand is above its neighbours.
     opening_m: f64,
@@ -62,6 +65,7 @@ impl PlaceUpright {
         let (object, base_in_tcp, _) =
             invocation.held.as_ref().ok_or_else(|| StartError::NothingHeld { kind: kind() })?;
         let place = invocation.destination.ok_or_else(|| StartError::NoDestination { kind: kind() })?;
+        let height_m = argument(invocation, "height")?;
         let wanted = place.pose * base_in_tcp.inverse();
         if !points_down(&wanted) {
             let tilt_rad = wanted.transform_vector(DVec3::Z).angle_between(-DVec3::Z);
@@ -69,7 +73,7 @@ impl PlaceUpright {
         }
         let rotation = downward(DVec3::ZERO, wanted.yaw()).rotation;
         let contact = Pose::new(place.pose.translation - rotation * base_in_tcp.translation, rotation);
-        within_reach(&hand.robot, "the place", contact.translation)?;
+        within_guarded_reach(&hand.robot, "the place", contact.translation)?;
         let above = contact.translation + GUARD_M * DVec3::Z;
         within_reach(&hand.robot, "the pose above the place", above)?;
         let obstacles = obstacles(invocation, place.pose.translation.z);
@@ -81,12 +85,14 @@ impl PlaceUpright {
         let start = hand.command.tcp.translation;
         let below_m = base_in_tcp.translation.z;
         let travel_height_m = safe_height(hand, start, contact.translation, &obstacles, floor_m, below_m)?;
+        let above_top_m = place.pose.translation.z + height_m + hand.tip_reach_m + SAFETY_M;
         Ok(PlaceUpright {
             object: *object,
             base_in_tcp: *base_in_tcp,
             contact,
             obstacles,
             travel_height_m,
+            leave_height_m: within_ceiling(hand, travel_height_m.max(above_top_m)),
             gap_m: feedback.opening_m,
             opening_m: hand.robot.max_opening_m,
             stage: Stage::Begin,
@@ -138,7 +144,7 @@ impl PlaceUpright {
 
     fn leave(&mut self, hand: &Hand) -> Next {
         self.stage = Stage::Leaving;
-        let height_m = within_ceiling(hand, self.travel_height_m.max(hand.command.tcp.translation.z));
+        let height_m = self.leave_height_m.max(hand.command.tcp.translation.z);
         let path = Path::vertical(hand.command.tcp, height_m, Pace::free(&hand.robot), hand.robot.tick_s);
         Next::Begin(Box::new(Reach::new(path, self.opening_m)))
     }
@@ -167,7 +173,7 @@ impl Function for PlaceUpright {
         }
     }
     fn withdraw_height_m(&self) -> f64 {
-        self.travel_height_m
+        self.leave_height_m
     }
     fn object(&self) -> ObjectId {
         self.object

@@ -3,9 +3,9 @@
 //! Arguments: `stroke`, how far it may have to travel, metres; `force`, at which it is taken to be at its end,
 //! newtons. The frame lies on the surface that is pressed.
 
-use super::{GUARD_M, PERCEPTION_ERROR_M, ROOMY_M, argument, require_empty_hand, within_ceiling};
+use super::{PERCEPTION_ERROR_M, ROOMY_M, argument, require_empty_hand, within_ceiling};
 use crate::{
-    clearance::{approach_clearance, obstacles, safe_height, within_reach},
+    clearance::{GUARD_M, approach_clearance, obstacles, safe_height, within_guarded_reach, within_reach},
     controller::StartError,
     geometry::{downward, nearest_heading},
     hand::Hand,
@@ -63,7 +63,7 @@ impl PressDown {
         require_empty_hand(invocation, feedback)?;
         let (stroke_m, force_n) = (argument(invocation, "stroke")?, argument(invocation, "force")?);
         let at = invocation.frame.translation + spiral(invocation.attempt) + hand.tip_reach_m * DVec3::Z;
-        within_reach(&hand.robot, "the press", at)?;
+        within_guarded_reach(&hand.robot, "the press", at)?;
         within_reach(&hand.robot, "the pose above the press", at + GUARD_M * DVec3::Z)?;
         let obstacles = obstacles(invocation, invocation.support_height_m);
         let contact = choose_heading(invocation, hand, at, &obstacles)?;
@@ -120,7 +120,9 @@ impl Function for PressDown {
                     return Next::Failed(failure);
                 }
                 self.stage = Stage::Rising;
-                let path = Path::vertical(hand.command.tcp, self.rise_height_m, pace, tick_s);
+                // Measured from where it was pressed, which need not be where it was perceived.
+                let height_m = self.rise_height_m.max(hand.command.tcp.translation.z + RISE_M);
+                let path = Path::vertical(hand.command.tcp, within_ceiling(hand, height_m), pace, tick_s);
                 Next::Begin(Box::new(Reach::new(path, 0.0)))
             }
             Stage::Rising => Next::Done,

@@ -1,0 +1,227 @@
+//! The builder that puts an agent together, and one episode's run.
+
+use crate::{
+    episode::{Episode, WipeAt},
+    executor::ExecutorActor,
+    host::{HostPort, Outside},
+    memory::MemoryActor,
+    message::{EPISODE, EXECUTOR, HOST, MEMORY, Message, PERCEPTION, PLANNER, VERIFIER},
+    perception::PerceptionActor,
+    planner::PlannerActor,
+    report::EpisodeReport,
+    verifier::VerifierActor,
+};
+use acm_concept::{
+    camera::{CameraSource, RgbdFrame},
+    embodiment::{Clock, Embodiment},
+    task::{OnUnknown, TaskSpec},
+    template::TemplateLibrary,
+};
+use acm_memory::Memory;
+use acm_perception::{Grounder, GrounderConfig};
+use acm_planner::{PlanOptions, Planner};
+use acm_runtime::{
+    envelope::Role,
+    frame_bus::{FrameBus, InProcessBus},
+    journal::{Journal, NoJournal},
+    system::{PanicAt, SystemBuilder, SystemError},
+};
+use std::{
+    collections::BTreeMap,
+    sync::{Arc, Mutex},
+    time::Duration,
+};
+use thiserror::Error;
+
+/// Frames that stay on the bus.
+const BUS_FRAMES: usize = 8;
+/// Wall time after which an episode that gives no result is held to hang.
+const WALL_LIMIT: Duration = Duration::from_secs(600);
+
+/// Why an agent could not be built or its episode ended without a report.
+#[derive(Debug, Error)]
+pub enum AgentError {
+    /// The task names no camera.
+    #[error("the task has no camera: the agent needs at least one")]
+    NoCamera,
+    /// The planner's lexicon is broken.
+    #[error(transparent)]
+    Lexicon(#[from] acm_planner::LexiconError),
+    /// The actors could not be started or gave no result.
+    #[error(transparent)]
+    System(#[from] SystemError),
+}
+
+/// What an agent is made of. Everything has a default but the world and the memory.
+pub struct AgentBuilder {
+    library: Arc<TemplateLibrary>,
+    memory: Arc<Mutex<Box<dyn Memory>>>,
+    on_unknown: OnUnknown,
+    seed: u64,
+    grounder: GrounderConfig,
+    journal: Arc<dyn Journal<Message>>,
+    wipe_at: Option<WipeAt>,
+    panic_at: Option<PanicAt>,
+}
+
+impl AgentBuilder {
+    /// What to do when memory cannot decide.
+    pub fn on_unknown(mut self, on_unknown: OnUnknown) -> Self {
+        self.on_unknown = on_unknown;
+        self
+    }
+    /// Seed of the draws that guessing makes.
+    pub fn seed(mut self, seed: u64) -> Self {
+        self.seed = seed;
+        self
+    }
+    /// Thresholds of perception.
+    pub fn grounder(mut self, config: GrounderConfig) -> Self {
+        self.grounder = config;
+        self
+    }
+    /// Where messages are written before they are handled.
+    pub fn journal(mut self, journal: Arc<dyn Journal<Message>>) -> Self {
+        self.journal = journal;
+        self
+    }
+    /// Wipes memory at an event, as a fault for tests.
+    pub fn wipe_at(mut self, event: Option<WipeAt>) -> Self {
+        self.wipe_at = event;
+        self
+    }
+    /// Makes an actor panic, as a fault for tests.
+    pub fn panic_at(mut self, panic_at: Option<PanicAt>) -> Self {
+        self.panic_at = panic_at;
+        self
+    }
+    /// The agent.
+    pub fn build(self) -> Result<Agent, AgentError> {
+        let planner = Arc::new(Planner::new()?);
+        Ok(Agent { parts: self, planner })
+    }
+}
+
+/// An agent that can run episodes over one memory.
+pub struct Agent {
+    parts: AgentBuilder,
+    planner: Arc<Planner>,
+}
+
+/// An episode's result with what it cost.
+#[derive(Debug, Clone)]
+pub struct EpisodeRun {
+    /// What the agent says of it.
+    pub report: EpisodeReport,
+    /// Wall time that each actor's handlers took.
+    pub spent: BTreeMap<Role, Duration>,
+}
+
+/// Asks a running episode to end.
+#[derive(Debug, Clone, Default)]
+pub struct Interrupt(Arc<tokio::sync::Notify>);
+
+impl Interrupt {
+    /// Ends the episode: the robot is stopped, memory keeps all that was written.
+    pub fn interrupt(&self) {
+        self.0.notify_one();
+    }
+}
+
+impl Agent {
+    /// Begins an agent with a library and a memory.
+    pub fn builder(library: Arc<TemplateLibrary>, memory: Box<dyn Memory>) -> AgentBuilder {
+        AgentBuilder {
+            library,
+            memory: Arc::new(Mutex::new(memory)),
+            on_unknown: OnUnknown::default(),
+            seed: 0,
+            grounder: GrounderConfig::default(),
+            journal: Arc::new(NoJournal),
+            wipe_at: None,
+            panic_at: None,
+        }
+    }
+
+    /// The memory that the agent writes.
+    pub fn memory(&self) -> Arc<Mutex<Box<dyn Memory>>> {
+        Arc::clone(&self.parts.memory)
+    }
+
+    /// Runs one episode. Must be called within a tokio runtime of at least two worker threads.
+    pub async fn run(
+        &self,
+        task: TaskSpec,
+        embodiment: Box<dyn Embodiment>,
+        cameras: Box<dyn CameraSource>,
+        clock: Box<dyn Clock>,
+        interrupt: &Interrupt,
+    ) -> Result<EpisodeRun, AgentError> {
+        let camera = task.cameras.first().ok_or(AgentError::NoCamera)?.name.clone();
+        let outside = Arc::new(Mutex::new(Outside { embodiment, cameras, clock }));
+        let mut system = self.system(task, camera, outside).start().await?;
+        system.send(EPISODE, Message::Begin);
+        let result = tokio::select! {
+            biased;
+            result = system.result(WALL_LIMIT) => result,
+            () = interrupt.0.notified() => {
+                system.send(HOST, Message::Interrupt);
+                system.send(EPISODE, Message::Interrupt);
+                system.result(WALL_LIMIT).await
+            }
+        };
+        let spent = system.stop().await;
+        match result? {
+            Message::Ended(report) => Ok(EpisodeRun { report: *report, spent }),
+            Message::ActorFailed { role, reason, .. } => {
+                Err(SystemError::Ended(format!("the {role} actor failed: {reason}")).into())
+            }
+            other => Err(SystemError::Ended(format!("unexpected result {other:?}")).into()),
+        }
+    }
+
+    fn system(&self, task: TaskSpec, camera: String, outside: Arc<Mutex<Outside>>) -> SystemBuilder<Message> {
+        let parts = &self.parts;
+        let bus: Arc<dyn FrameBus<RgbdFrame>> = Arc::new(InProcessBus::new(BUS_FRAMES));
+        let robot = outside.lock().unwrap_or_else(std::sync::PoisonError::into_inner).embodiment.description().clone();
+        let grounder = Arc::new(Grounder::new(Arc::clone(&parts.library), parts.grounder.clone()));
+        let options = PlanOptions { on_unknown: parts.on_unknown, seed: parts.seed };
+        let (memory, wipe_at) = (Arc::clone(&parts.memory), parts.wipe_at.clone());
+        let (planner, library) = (Arc::clone(&self.planner), Arc::clone(&parts.library));
+        let (frames, seen, kept) = (Arc::clone(&bus), Arc::clone(&bus), bus);
+        let (eyes, hands, plans) = (robot.clone(), robot.clone(), robot);
+        SystemBuilder::new(1, Arc::clone(&parts.journal))
+            .actor(EPISODE, Box::new(move || Box::new(Episode::new(task.clone(), wipe_at.clone()))))
+            .actor(
+                HOST,
+                Box::new(move || {
+                    Box::new(HostPort::new(Arc::clone(&outside), camera.clone(), Arc::clone(&frames)))
+                }),
+            )
+            .actor(
+                PERCEPTION,
+                Box::new(move || {
+                    Box::new(PerceptionActor::new(Arc::clone(&grounder), eyes.clone(), Arc::clone(&seen)))
+                }),
+            )
+            .actor(MEMORY, Box::new(move || Box::new(MemoryActor::new(Arc::clone(&memory), Arc::clone(&kept)))))
+            .actor(
+                PLANNER,
+                Box::new(move || {
+                    let (planner, library) = (Arc::clone(&planner), Arc::clone(&library));
+                    Box::new(PlannerActor::new(planner, library, plans.clone(), options.clone()))
+                }),
+            )
+            .actor(EXECUTOR, Box::new(move || Box::new(ExecutorActor::new(hands.clone()))))
+            .actor(VERIFIER, Box::new(|| Box::new(VerifierActor)))
+            .notify(
+                EPISODE,
+                Box::new(|failure| Message::ActorFailed {
+                    role: failure.role.0,
+                    reason: failure.reason,
+                    restarted: failure.restarted,
+                }),
+            )
+            .panic_at(parts.panic_at)
+    }
+}

@@ -1,0 +1,88 @@
+//! Where an episode stands between two messages.
+
+use acm_concept::{
+    ids::TransitionId,
+    skill::{FailureCause, SkillInvocation, SkillReport},
+    time::Time,
+};
+use acm_memory::observation::{Executed, Outcome};
+use std::{collections::BTreeMap, str::FromStr};
+use thiserror::Error;
+
+/// What the loop waits for.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Doing {
+    Starting,
+    Beginning,
+    Waiting,
+    Looking,
+    Parsing,
+    Instructing,
+    Deciding,
+    Noting,
+    Retreating,
+    Executing,
+    Recording,
+    Verifying,
+    Settling(Outcome),
+    Wiping,
+    Ended,
+}
+
+/// A finished skill that waits for its verdict.
+pub(super) struct Pending {
+    pub transition: Option<TransitionId>,
+    pub executed: Executed,
+    pub looks: u32,
+}
+
+/// The event at which memory is wiped, as a fault for tests.
+///
+/// ```
+/// # use acm_actors::episode::WipeAt;
+/// assert_eq!("first-verified-place".parse(), Ok(WipeAt::FirstVerified("place".into())));
+/// assert_eq!("instruction".parse(), Ok(WipeAt::Instruction));
+/// assert!("noon".parse::<WipeAt>().is_err());
+/// ```
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum WipeAt {
+    /// When the instruction has been given.
+    Instruction,
+    /// When the first skill of this name was verified.
+    FirstVerified(String),
+}
+
+/// A text that names no event.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error("`{0}` is no event: write `instruction` or `first-verified-SKILL`, such as `first-verified-place`")]
+pub struct ParseEventError(String);
+
+impl FromStr for WipeAt {
+    type Err = ParseEventError;
+    fn from_str(text: &str) -> Result<Self, ParseEventError> {
+        match (text, text.strip_prefix("first-verified-")) {
+            ("instruction", _) => Ok(WipeAt::Instruction),
+            (_, Some(skill)) if !skill.is_empty() => Ok(WipeAt::FirstVerified(skill.into())),
+            _ => Err(ParseEventError(text.into())),
+        }
+    }
+}
+
+/// The report of a skill whose executor is gone.
+pub(super) fn lost_report(
+    invocation: Box<SkillInvocation>,
+    failure: Option<(FailureCause, String)>,
+    now: Time,
+) -> SkillReport {
+    SkillReport {
+        invocation: *invocation,
+        failure,
+        primitives: Vec::new(),
+        started: now,
+        ended: now,
+        measured: BTreeMap::new(),
+        felt: Vec::new(),
+        left_at: None,
+        held: None,
+    }
+}

@@ -1,0 +1,54 @@
+//! The perception actor: asks for a frame and grounds it against what memory expects.
+
+use crate::message::{EPISODE, HOST, MEMORY, Message};
+use acm_concept::{camera::RgbdFrame, embodiment::RobotDescription, expectation::Expectation};
+use acm_perception::Grounder;
+use acm_runtime::{
+    core::{Core, CoreError, Outbox},
+    envelope::Envelope,
+    frame_bus::FrameBus,
+};
+use std::sync::Arc;
+
+/// The perception actor.
+pub struct PerceptionActor {
+    grounder: Arc<Grounder>,
+    robot: RobotDescription,
+    bus: Arc<dyn FrameBus<RgbdFrame>>,
+    /// The expectation for the frame that was asked for.
+    expectation: Option<Expectation>,
+}
+
+impl PerceptionActor {
+    /// An actor that grounds with `grounder` and takes frames from `bus`.
+    pub fn new(grounder: Arc<Grounder>, robot: RobotDescription, bus: Arc<dyn FrameBus<RgbdFrame>>) -> PerceptionActor {
+        PerceptionActor { grounder, robot, bus, expectation: None }
+    }
+}
+
+impl Core<Message> for PerceptionActor {
+    fn handle(&mut self, message: Envelope<Message>, outbox: &mut Outbox<Message>) -> Result<(), CoreError> {
+        match message.body {
+            Message::Expected(expectation) => {
+                self.expectation = Some(expectation);
+                outbox.send(HOST, Message::Capture);
+            }
+            Message::Frame { header, feedback } => {
+                let frame = match self.bus.get(header.id.0) {
+                    Ok(frame) => frame,
+                    Err(lost) => {
+                        outbox.send(EPISODE, Message::Broken { reason: lost.to_string() });
+                        return Ok(());
+                    }
+                };
+                let mut expectation = self.expectation.take().unwrap_or_default();
+                expectation.time = header.time;
+                expectation.robot = self.robot.solids(&feedback.tcp, feedback.opening_m);
+                let percepts = Box::new(self.grounder.ground(&frame, &expectation));
+                outbox.send(MEMORY, Message::Percepts { percepts, feedback });
+            }
+            other => return Err(CoreError(format!("perception cannot handle {other:?}"))),
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,92 @@
+//! What an episode came to.
+
+use acm_concept::{
+    ids::ObjectId,
+    skill::FailureCause,
+    time::Time,
+};
+use acm_memory::observation::Outcome;
+use acm_planner::GiveUpCause;
+use serde::Serialize;
+
+/// How an episode ended, from the agent's side. Whether it was right is for the judge to say.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Ending {
+    /// The agent holds the task to be done.
+    Done,
+    /// The agent gave up and says what it does not know or cannot do.
+    GaveUp {
+        /// The kind of reason that it names.
+        cause: GiveUpCause,
+        /// In words.
+        unknown: String,
+    },
+    /// The instruction cannot be read.
+    NotUnderstood {
+        /// Which words, and why.
+        reason: String,
+    },
+    /// The user or the host ended it.
+    Interrupted,
+    /// An actor or the outside world failed for good.
+    Broken {
+        /// What.
+        reason: String,
+    },
+}
+
+/// One skill that was run.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct StepRecord {
+    /// The subtask it served, from 0.
+    pub subtask: u32,
+    /// Skill name.
+    pub skill: String,
+    /// The object acted on.
+    pub object: ObjectId,
+    /// 0 for the first try.
+    pub attempt: u32,
+    /// Whether a candidate was drawn where memory could not decide.
+    pub guessed: bool,
+    /// When the skill ended.
+    pub ended: Time,
+    /// The controller's own failure.
+    pub failure: Option<(FailureCause, String)>,
+    /// The verifier's answer, once there is one.
+    pub outcome: Option<Outcome>,
+    /// Entries scored by the retrievals behind the step (retrieval effort a).
+    pub entries_scored: u32,
+    /// Candidates handed on until one was accepted (retrieval effort b).
+    pub candidates_inspected: u32,
+}
+
+/// An episode from the agent's side.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct EpisodeReport {
+    /// How it ended.
+    pub ending: Ending,
+    /// The skills that were run, in order.
+    pub steps: Vec<StepRecord>,
+    /// Subtasks found done.
+    pub subtasks_done: u32,
+    /// Subtasks of the instruction; 0 if it was not understood.
+    pub subtasks: u32,
+    /// Frames that were perceived.
+    pub frames_perceived: u32,
+    /// Virtual time at the end.
+    pub ended: Time,
+    /// Actors that failed and were restarted.
+    pub restarts: u32,
+}
+
+impl EpisodeReport {
+    /// The kind of failure to blame, from the agent's side: what it named when giving up, else the last step that
+    /// failed.
+    pub fn cause(&self) -> Option<GiveUpCause> {
+        match &self.ending {
+            Ending::GaveUp { cause, .. } => Some(*cause),
+            _ => self.steps.iter().rev().find_map(|step| step.failure.as_ref().map(|(cause, _)| (*cause).into())),
+        }
+    }
+}

@@ -1,0 +1,246 @@
+//! The command line and its exit codes.
+
+use crate::{demo, doctor, inject::Injection, perceive, run, scenario};
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use std::{path::PathBuf, process::ExitCode, str::FromStr};
+
+/// How the process ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Exit {
+    /// 0: success; for a range of seeds, all solved.
+    Success,
+    /// 1: failed.
+    Failed,
+    /// 2: unusable input.
+    Unusable,
+    /// 3: the agent gave up honestly; for a range, none failed but some gave up.
+    GaveUp,
+    /// 130: interrupted.
+    Interrupted,
+}
+
+impl Exit {
+    /// The process's exit code.
+    pub fn code(self) -> u8 {
+        match self {
+            Exit::Success => 0,
+            Exit::Failed => 1,
+            Exit::Unusable => 2,
+            Exit::GaveUp => 3,
+            Exit::Interrupted => 130,
+        }
+    }
+}
+
+impl From<Exit> for ExitCode {
+    fn from(exit: Exit) -> ExitCode {
+        ExitCode::from(exit.code())
+    }
+}
+
+/// Analytic concept-centric memory: an agent runtime for robots that must remember.
+#[derive(Debug, Parser)]
+#[command(name = "acm", version, max_term_width = 100)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// The commands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Run a scenario with the agent and let the judge decide.
+    Run(RunArgs),
+    /// Tell the story of one episode, then of the same robot without its memory.
+    Demo(DemoArgs),
+    /// Ground one real RGB-D frame into objects; no simulator.
+    Perceive(PerceiveArgs),
+    /// List, check, describe or draw scenarios.
+    #[command(subcommand)]
+    Scenario(ScenarioCommand),
+    /// Say what this machine has of what ACM needs.
+    Doctor,
+}
+
+/// One seed or a range that includes both ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Seeds {
+    /// First seed.
+    pub first: u64,
+    /// Last seed, included.
+    pub last: u64,
+    /// Whether a range was written, even one of a single seed.
+    pub range: bool,
+}
+
+impl FromStr for Seeds {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Self, String> {
+        let number = |text: &str| {
+            text.parse::<u64>().map_err(|e| format!("`{text}` is not a seed ({e}): write 7, or 0..49 with both ends"))
+        };
+        let Some((first, last)) = text.split_once("..") else {
+            let seed = number(text)?;
+            return Ok(Seeds { first: seed, last: seed, range: false });
+        };
+        let (first, last) = (number(first)?, number(last.strip_prefix('=').unwrap_or(last))?);
+        if first > last || last - first >= 1_000_000 {
+            return Err(format!("the range {first}..{last} must rise and hold at most 1,000,000 seeds"));
+        }
+        Ok(Seeds { first, last, range: true })
+    }
+}
+
+/// What the agent does when memory cannot decide.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+pub enum OnUnknownArg {
+    /// Give up and say what is not known.
+    #[default]
+    Abstain,
+    /// Draw one of the candidates.
+    Guess,
+}
+
+impl From<OnUnknownArg> for acm_concept::task::OnUnknown {
+    fn from(arg: OnUnknownArg) -> Self {
+        match arg {
+            OnUnknownArg::Abstain => acm_concept::task::OnUnknown::Abstain,
+            OnUnknownArg::Guess => acm_concept::task::OnUnknown::Guess,
+        }
+    }
+}
+
+/// Arguments of `acm run`.
+#[derive(Debug, Args)]
+pub struct RunArgs {
+    /// A scenario's name (`acm scenario list`) or a scenario file; a file that exists goes first.
+    pub scenario: String,
+    /// A seed, or a range A..B that includes both ends.
+    #[arg(long, default_value = "0")]
+    pub seed: Seeds,
+    /// The memory: acm, paper-identity, reactive, first-frame.
+    #[arg(long, default_value = "acm")]
+    pub method: String,
+    /// What to do when memory cannot decide.
+    #[arg(long, value_enum, default_value_t)]
+    pub on_unknown: OnUnknownArg,
+    /// Give this instruction instead of the scenario's own.
+    #[arg(long)]
+    pub instruction: Option<String>,
+    /// Keep memory in this folder, and go on with what it holds.
+    #[arg(long, value_name = "DIR")]
+    pub memory: Option<PathBuf>,
+    /// Template files instead of the built-in library.
+    #[arg(long, value_name = "DIR")]
+    pub library: Option<PathBuf>,
+    /// A fault: black-frames, freeze-frames, wipe-memory@EVENT, slip@N. May be given more than once.
+    #[arg(long, value_name = "FAULT")]
+    pub inject: Vec<Injection>,
+    /// Refuse every motion, as on a robot that must not move.
+    #[arg(long)]
+    pub no_motion: bool,
+    /// Another sensor profile than the scenario's: none, d435, d435-hard.
+    #[arg(long, value_name = "PROFILE")]
+    pub sensor: Option<String>,
+    /// Print the results as JSON instead of text.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `acm demo`.
+#[derive(Debug, Args)]
+pub struct DemoArgs {
+    /// The episode's seed.
+    #[arg(long, default_value_t = 7)]
+    pub seed: u64,
+    /// Where the demo leaves its memory and pictures.
+    #[arg(long, value_name = "DIR", default_value = "out/demo")]
+    pub out: PathBuf,
+}
+
+/// Arguments of `acm perceive`.
+#[derive(Debug, Args)]
+pub struct PerceiveArgs {
+    /// Colour image: 8-bit PNG.
+    #[arg(long, value_name = "FILE")]
+    pub color: PathBuf,
+    /// Depth image registered to the colour: 16-bit grey PNG of the same size, 0 where nothing was measured.
+    #[arg(long, value_name = "FILE")]
+    pub depth: PathBuf,
+    /// fx,fy,cx,cy in pixels.
+    #[arg(long, value_name = "FX,FY,CX,CY", value_delimiter = ',', num_args = 1, required = true)]
+    pub intrinsics: Vec<f64>,
+    /// Metres per unit of the depth image.
+    #[arg(long, value_name = "M", default_value_t = 0.001)]
+    pub depth_scale: f64,
+    /// Keep what is seen in this memory folder, and go on with what it holds.
+    #[arg(long, value_name = "DIR")]
+    pub memory: Option<PathBuf>,
+    /// Draw outlines, ids, sizes and fitted solids over the colour image into this PNG.
+    #[arg(long, value_name = "FILE")]
+    pub overlay: Option<PathBuf>,
+    /// Write a 16-bit PNG with one value an object, 0 for the background.
+    #[arg(long, value_name = "FILE")]
+    pub labels: Option<PathBuf>,
+    /// Print JSON instead of text.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// The verbs of `acm scenario`.
+#[derive(Debug, Subcommand)]
+pub enum ScenarioCommand {
+    /// Names and summaries of the scenarios in this program.
+    List,
+    /// Check a scenario file.
+    Check {
+        /// The file, or a scenario's name.
+        file: String,
+    },
+    /// The JSON schema of scenario files, with every field described.
+    Schema,
+    /// Draw the initial world as the agent's main camera sees it.
+    Preview {
+        /// A scenario's name or file.
+        file: String,
+        /// The seed.
+        #[arg(long, default_value_t = 0)]
+        seed: u64,
+        /// The PNG to write.
+        #[arg(short, long, value_name = "PNG")]
+        out: PathBuf,
+        /// Also print what is where (the simulator's truth, which no agent sees).
+        #[arg(long)]
+        info: bool,
+    },
+}
+
+/// Performs a command.
+pub fn run(cli: Cli) -> anyhow::Result<Exit> {
+    match cli.command {
+        Command::Run(args) => run::run(&args),
+        Command::Demo(args) => demo::run(&args),
+        Command::Perceive(args) => perceive::run(&args),
+        Command::Scenario(command) => scenario::run(&command),
+        Command::Doctor => doctor::run(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn seeds_include_both_ends() {
+        assert_eq!("3..5".parse(), Ok(Seeds { first: 3, last: 5, range: true }));
+        assert_eq!("8".parse(), Ok(Seeds { first: 8, last: 8, range: false }));
+        assert!("5..3".parse::<Seeds>().is_err() && "x".parse::<Seeds>().is_err());
+    }
+
+    #[test]
+    fn the_command_line_is_well_formed() {
+        use clap::CommandFactory;
+        Cli::command().debug_assert();
+    }
+}

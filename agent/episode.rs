@@ -1,0 +1,235 @@
+//! One episode: simulator, agent, judge.
+
+use crate::inject::{Faults, FrameTap};
+use acm_actors::{
+    Agent,
+    agent::Interrupt,
+    message::Message,
+    report::{Ending, EpisodeReport},
+};
+use acm_concept::{
+    embodiment::{Command, Embodiment, EmbodimentError, Feedback, RobotDescription},
+    task::OnUnknown,
+    template::TemplateLibrary,
+};
+use acm_planner::GiveUpCause;
+use acm_runtime::{journal::Journal, system::PanicAt};
+use acm_sim::{OracleVerdict, Scenario, SharedRenderer, SimOptions, SimTimings, Simulation};
+use anyhow::Context;
+use serde::Serialize;
+use std::{
+    collections::BTreeMap,
+    path::PathBuf,
+    sync::{
+        Arc, Mutex, PoisonError,
+        atomic::{AtomicU64, Ordering},
+    },
+    time::Instant,
+};
+
+/// How an episode is to be run.
+#[derive(Debug, Clone, Default)]
+pub struct EpisodeConfig {
+    /// Name of the memory.
+    pub method: String,
+    /// What to do when memory cannot decide.
+    pub on_unknown: OnUnknown,
+    /// Instruction instead of the scenario's own.
+    pub instruction: Option<String>,
+    /// Folder of a memory that lasts.
+    pub memory: Option<PathBuf>,
+    /// Faults.
+    pub faults: Faults,
+    /// Whether the robot may not move.
+    pub no_motion: bool,
+    /// Another sensor profile.
+    pub sensor: Option<String>,
+    /// Keeps frames on their way to the agent.
+    pub frames: Option<FrameTap>,
+    /// For tests: the actor of this name panics at its nth message.
+    pub panic_at: Option<(String, u64)>,
+}
+
+/// What an episode came to, from both sides.
+#[derive(Debug, Clone, Serialize)]
+pub struct EpisodeResult {
+    /// The seed.
+    pub seed: u64,
+    /// The agent says done and the judge's strict predicate holds.
+    pub solved: bool,
+    /// The agent says done and the judge says no.
+    pub false_success: bool,
+    /// The judge.
+    pub verdict: OracleVerdict,
+    /// The kind of failure to blame, if it was not solved.
+    pub cause: Option<GiveUpCause>,
+    /// The agent's report.
+    pub report: EpisodeReport,
+    /// Equal for equal initial worlds.
+    pub world: String,
+    /// Motion commands that reached the robot.
+    pub motion_commands: u64,
+    /// Wall time of the whole episode, seconds.
+    pub wall_s: f64,
+    /// Wall time by what it went to, seconds.
+    pub spent_s: BTreeMap<String, f64>,
+}
+
+/// Runs episodes: holds what they share.
+pub struct Runner {
+    runtime: tokio::runtime::Runtime,
+    renderer: SharedRenderer,
+    library: Arc<TemplateLibrary>,
+    interrupt: Interrupt,
+}
+
+impl Runner {
+    /// Starts the renderer and the runtime.
+    pub fn new() -> anyhow::Result<Runner> {
+        Runner::with_library(acm_memory::default_library()?)
+    }
+
+    /// As [`Runner::new`], with another template library.
+    pub fn with_library(library: TemplateLibrary) -> anyhow::Result<Runner> {
+        // Ports block while they render or step the world, so one worker more than one.
+        let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?;
+        let renderer = Arc::new(Mutex::new(acm_render::Renderer::new()?));
+        Ok(Runner { runtime, renderer, library: Arc::new(library), interrupt: Interrupt::default() })
+    }
+
+    /// Ends the running episode when the process is interrupted from the keyboard.
+    pub fn end_on_ctrl_c(&self) {
+        let interrupt = self.interrupt.clone();
+        // The one task outside the actors: it only waits for the signal.
+        #[allow(clippy::disallowed_methods)]
+        self.runtime.spawn(async move {
+            if tokio::signal::ctrl_c().await.is_ok() {
+                interrupt.interrupt();
+            }
+        });
+    }
+
+    /// The template library.
+    pub fn library(&self) -> &Arc<TemplateLibrary> {
+        &self.library
+    }
+    /// What the renderer runs on.
+    pub fn adapter(&self) -> String {
+        self.renderer.lock().unwrap_or_else(PoisonError::into_inner).adapter().to_string()
+    }
+    /// The renderer, which takes a second to start and is shared.
+    pub fn renderer(&self) -> SharedRenderer {
+        Arc::clone(&self.renderer)
+    }
+
+    /// Runs one episode.
+    pub fn run(
+        &self,
+        scenario: &Scenario,
+        seed: u64,
+        config: &EpisodeConfig,
+        journal: Arc<dyn Journal<Message>>,
+    ) -> anyhow::Result<EpisodeResult> {
+        let options = SimOptions {
+            seed,
+            slip_at: config.faults.slip_at,
+            sensor: config.sensor.clone(),
+            motion: !config.no_motion,
+            camera_size: None,
+        };
+        let started = now();
+        let simulation = Simulation::new(scenario, &options, self.renderer()).context("the world cannot be built")?;
+        let world = simulation.world_digest();
+        let built_s = started.elapsed().as_secs_f64();
+        let memory = acm_baselines::by_name(&config.method, Arc::clone(&self.library), config.memory.as_deref())?;
+        let agent = Agent::builder(Arc::clone(&self.library), memory)
+            .on_unknown(config.on_unknown)
+            .seed(seed)
+            .wipe_at(config.faults.wipe_at.clone())
+            .journal(journal)
+            .panic_at(config.panic_at.as_ref().and_then(|(role, message)| fault_of(role, *message)))
+            .build()?;
+        let mut task = simulation.task();
+        if let Some(instruction) = &config.instruction {
+            task.instruction.clone_from(instruction);
+        }
+        let commands = Arc::new(AtomicU64::new(0));
+        let robot = Box::new(Counted { robot: simulation.embodiment(), commands: Arc::clone(&commands) });
+        let mut cameras = config.faults.cameras(simulation.camera());
+        if let Some(tap) = &config.frames {
+            cameras = tap.cameras(cameras);
+        }
+        let run = self.runtime.block_on(agent.run(task, robot, cameras, simulation.clock(), &self.interrupt))?;
+        let verdict = simulation.verdict();
+        let done = run.report.ending == Ending::Done;
+        let solved = done && verdict.strict;
+        let mut spent_s: BTreeMap<String, f64> =
+            run.spent.iter().map(|(role, time)| (role.to_string(), time.as_secs_f64())).collect();
+        split_host_time(&mut spent_s, &simulation.timings());
+        spent_s.insert("world-building".into(), built_s);
+        Ok(EpisodeResult {
+            seed,
+            solved,
+            false_success: done && !verdict.strict,
+            cause: if solved { None } else { Some(blame(&run.report, &verdict)) },
+            verdict,
+            report: run.report,
+            world,
+            motion_commands: commands.load(Ordering::Relaxed),
+            wall_s: started.elapsed().as_secs_f64(),
+            spent_s,
+        })
+    }
+}
+
+fn fault_of(role: &str, message: u64) -> Option<PanicAt> {
+    use acm_actors::message::{EXECUTOR, HOST, MEMORY, PERCEPTION, PLANNER, VERIFIER};
+    let roles = [EXECUTOR, HOST, MEMORY, PERCEPTION, PLANNER, VERIFIER];
+    roles.into_iter().find(|known| known.0 == role).map(|role| PanicAt { role, message })
+}
+
+/// The host's time is the world's: physics, rendering and sensor noise are what it consists of.
+fn split_host_time(spent_s: &mut BTreeMap<String, f64>, timings: &SimTimings) {
+    let host = spent_s.remove("host").unwrap_or(0.0);
+    let parts = [("physics", timings.physics_s), ("render", timings.render_s), ("noise", timings.noise_s)];
+    let known: f64 = parts.iter().map(|(_, seconds)| seconds).sum();
+    spent_s.extend(parts.map(|(name, seconds)| (name.to_string(), seconds)));
+    spent_s.insert("host-other".into(), (host - known).max(0.0));
+}
+
+/// What to blame: what the agent itself named, else what the judge found not to hold.
+fn blame(report: &EpisodeReport, verdict: &OracleVerdict) -> GiveUpCause {
+    match &report.ending {
+        Ending::GaveUp { cause, .. } => *cause,
+        Ending::NotUnderstood { .. } => GiveUpCause::Plan,
+        _ => report.cause().unwrap_or(if verdict.violations.is_empty() { GiveUpCause::Place } else { GiveUpCause::Plan }),
+    }
+}
+
+/// Counts the motion commands that reach the robot.
+struct Counted {
+    robot: Box<dyn Embodiment>,
+    commands: Arc<AtomicU64>,
+}
+
+impl Embodiment for Counted {
+    fn description(&self) -> &RobotDescription {
+        self.robot.description()
+    }
+    fn feedback(&self) -> Feedback {
+        self.robot.feedback()
+    }
+    fn command(&mut self, command: &Command) -> Result<Feedback, EmbodimentError> {
+        self.commands.fetch_add(1, Ordering::Relaxed);
+        self.robot.command(command)
+    }
+    fn stop(&mut self) {
+        self.robot.stop();
+    }
+}
+
+/// Wall time is measured here and printed; no decision depends on it.
+#[allow(clippy::disallowed_methods)]
+fn now() -> Instant {
+    Instant::now()
+}

@@ -1,0 +1,156 @@
+//! Faults that can be put between the agent and its world.
+
+use acm_actors::episode::WipeAt;
+use acm_concept::camera::{CameraError, CameraModel, CameraSource, RgbdFrame};
+use std::{
+    str::FromStr,
+    sync::{Arc, Mutex, PoisonError},
+};
+
+/// A fault, as `--inject` takes it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Injection {
+    /// Every frame is black and without depth.
+    BlackFrames,
+    /// Every frame shows what the first one showed.
+    FreezeFrames,
+    /// Memory is wiped once at an event.
+    WipeMemory(WipeAt),
+    /// What the hand carries is taken out of it unseen, during its nth carry from 1.
+    Slip(u32),
+}
+
+impl FromStr for Injection {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.split_once('@') {
+            None if text == "black-frames" => Ok(Injection::BlackFrames),
+            None if text == "freeze-frames" => Ok(Injection::FreezeFrames),
+            Some(("wipe-memory", event)) => {
+                event.parse().map(Injection::WipeMemory).map_err(|e: acm_actors::episode::ParseEventError| e.to_string())
+            }
+            Some(("slip", carry)) => match carry.parse() {
+                Ok(carry) if carry > 0 => Ok(Injection::Slip(carry)),
+                _ => Err(format!("`{carry}` is no number of a carry: write slip@1 for the first")),
+            },
+            _ => Err(format!(
+                "`{text}` is no fault: black-frames, freeze-frames, wipe-memory@EVENT or slip@N"
+            )),
+        }
+    }
+}
+
+/// The faults of one episode, sorted by where they act.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Faults {
+    /// See [`Injection::BlackFrames`].
+    pub black_frames: bool,
+    /// See [`Injection::FreezeFrames`].
+    pub freeze_frames: bool,
+    /// See [`Injection::WipeMemory`].
+    pub wipe_at: Option<WipeAt>,
+    /// See [`Injection::Slip`].
+    pub slip_at: Option<u32>,
+}
+
+impl Faults {
+    /// Sorts faults; of two that exclude each other the later one holds.
+    pub fn new(injections: &[Injection]) -> Faults {
+        let mut faults = Faults::default();
+        for injection in injections {
+            match injection {
+                Injection::BlackFrames => faults.black_frames = true,
+                Injection::FreezeFrames => faults.freeze_frames = true,
+                Injection::WipeMemory(event) => faults.wipe_at = Some(event.clone()),
+                Injection::Slip(carry) => faults.slip_at = Some(*carry),
+            }
+        }
+        faults
+    }
+    /// Puts the camera faults in front of a camera.
+    pub fn cameras(&self, cameras: Box<dyn CameraSource>) -> Box<dyn CameraSource> {
+        if !self.black_frames && !self.freeze_frames {
+            return cameras;
+        }
+        Box::new(FaultyCamera { cameras, black: self.black_frames, first: None })
+    }
+}
+
+/// Keeps the first frames that pass, for pictures.
+#[derive(Debug, Clone)]
+pub struct FrameTap {
+    limit: usize,
+    frames: Arc<Mutex<Vec<RgbdFrame>>>,
+}
+
+impl FrameTap {
+    /// Keeps at most `limit` frames.
+    pub fn first(limit: usize) -> FrameTap {
+        FrameTap { limit, frames: Arc::default() }
+    }
+    /// The frames so far.
+    pub fn frames(&self) -> Vec<RgbdFrame> {
+        self.frames.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+    /// A camera whose frames also come here.
+    pub fn cameras(&self, cameras: Box<dyn CameraSource>) -> Box<dyn CameraSource> {
+        Box::new(TappedCamera { cameras, tap: self.clone() })
+    }
+}
+
+struct TappedCamera {
+    cameras: Box<dyn CameraSource>,
+    tap: FrameTap,
+}
+
+impl CameraSource for TappedCamera {
+    fn cameras(&self) -> &[CameraModel] {
+        self.cameras.cameras()
+    }
+    fn capture(&mut self, camera: &str) -> Result<RgbdFrame, CameraError> {
+        let frame = self.cameras.capture(camera)?;
+        let mut frames = self.tap.frames.lock().unwrap_or_else(PoisonError::into_inner);
+        if frames.len() < self.tap.limit {
+            frames.push(frame.clone());
+        }
+        Ok(frame)
+    }
+}
+
+struct FaultyCamera {
+    cameras: Box<dyn CameraSource>,
+    black: bool,
+    first: Option<RgbdFrame>,
+}
+
+impl CameraSource for FaultyCamera {
+    fn cameras(&self) -> &[CameraModel] {
+        self.cameras.cameras()
+    }
+    fn capture(&mut self, camera: &str) -> Result<RgbdFrame, CameraError> {
+        let mut frame = self.cameras.capture(camera)?;
+        if self.black {
+            frame.color = Arc::from(vec![0; frame.color.len()]);
+            frame.depth = Arc::from(vec![0.0; frame.depth.len()]);
+            return Ok(frame);
+        }
+        let first = self.first.get_or_insert_with(|| frame.clone());
+        frame.color = Arc::clone(&first.color);
+        frame.depth = Arc::clone(&first.depth);
+        Ok(frame)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn faults_are_read_and_mistakes_named() {
+        assert_eq!("slip@2".parse(), Ok(Injection::Slip(2)));
+        assert_eq!("wipe-memory@instruction".parse(), Ok(Injection::WipeMemory(WipeAt::Instruction)));
+        for bad in ["slip@0", "slip", "wipe-memory@noon", "white-frames"] {
+            assert!(bad.parse::<Injection>().is_err(), "{bad}");
+        }
+    }
+}

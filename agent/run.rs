@@ -1,0 +1,275 @@
+//! `acm run`: one episode told, or a range of seeds counted.
+
+use crate::{
+    cli::{Exit, RunArgs},
+    episode::{EpisodeConfig, EpisodeResult, Runner},
+    inject::Faults,
+    narrate::Narrator,
+    statistics::{median_and, wilson95},
+};
+use acm_actors::report::Ending;
+use acm_runtime::journal::NoJournal;
+use acm_sim::Scenario;
+use indicatif::{ProgressBar, ProgressStyle};
+use serde::Serialize;
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    io::Write,
+    sync::Arc,
+};
+
+/// Runs `acm run`.
+pub fn run(args: &RunArgs) -> anyhow::Result<Exit> {
+    let scenario = Scenario::open(&args.scenario)?;
+    let config = EpisodeConfig {
+        method: args.method.clone(),
+        on_unknown: args.on_unknown.into(),
+        instruction: args.instruction.clone(),
+        memory: args.memory.clone(),
+        faults: Faults::new(&args.inject),
+        no_motion: args.no_motion,
+        sensor: args.sensor.clone(),
+        frames: None,
+        panic_at: None,
+    };
+    let library = match &args.library {
+        Some(dir) => acm_memory::library_from_dir(dir)?,
+        None => acm_memory::default_library()?,
+    };
+    // A misspelt method or a memory that cannot be opened must not cost the start of the renderer.
+    drop(acm_baselines::by_name(&config.method, Arc::new(library.clone()), config.memory.as_deref())?);
+    let runner = Runner::with_library(library)?;
+    runner.end_on_ctrl_c();
+    match args.seed.range {
+        false => one(&runner, &scenario, args, &config),
+        true => many(&runner, &scenario, args, &config),
+    }
+}
+
+fn one(runner: &Runner, scenario: &Scenario, args: &RunArgs, config: &EpisodeConfig) -> anyhow::Result<Exit> {
+    let result = if args.json {
+        runner.run(scenario, args.seed.first, config, Arc::new(NoJournal))?
+    } else {
+        println!("{} seed {}: {}", scenario.name(), args.seed.first, scenario.summary());
+        let narrator = Arc::new(Narrator::new(Box::new(std::io::stdout())));
+        runner.run(scenario, args.seed.first, config, narrator)?
+    };
+    if args.json {
+        let runs = Runs::new(scenario, args, std::slice::from_ref(&result));
+        serde_json::to_writer_pretty(std::io::stdout().lock(), &runs)?;
+        println!();
+    } else {
+        print_judgement(&result)?;
+        print_times(std::slice::from_ref(&result))?;
+    }
+    Ok(exit_of(&result))
+}
+
+fn many(runner: &Runner, scenario: &Scenario, args: &RunArgs, config: &EpisodeConfig) -> anyhow::Result<Exit> {
+    let count = args.seed.last - args.seed.first + 1;
+    let bar = progress(count, args.json);
+    let mut results = Vec::new();
+    for seed in args.seed.first..=args.seed.last {
+        let result = runner.run(scenario, seed, config, Arc::new(NoJournal))?;
+        bar.println(line(&result));
+        bar.inc(1);
+        let interrupted = result.report.ending == Ending::Interrupted;
+        results.push(result);
+        bar.set_message(format!("{} solved", results.iter().filter(|r| r.solved).count()));
+        if interrupted {
+            break;
+        }
+    }
+    bar.finish_and_clear();
+    let runs = Runs::new(scenario, args, &results);
+    if args.json {
+        serde_json::to_writer_pretty(std::io::stdout().lock(), &runs)?;
+        println!();
+    } else {
+        print_summary(&runs, count as usize)?;
+        print_times(&results)?;
+    }
+    Ok(exit_of_range(&results, count as usize))
+}
+
+/// Lines go to standard error, so that JSON on standard output stays clean.
+fn progress(count: u64, hidden: bool) -> ProgressBar {
+    if hidden {
+        return ProgressBar::hidden();
+    }
+    let style = ProgressStyle::with_template("{bar:30} {pos}/{len} {msg} {elapsed} eta {eta}");
+    let bar = ProgressBar::new(count);
+    match style {
+        Ok(style) => bar.with_style(style),
+        Err(_template) => bar,
+    }
+}
+
+/// The exit of one episode.
+pub fn exit_of(result: &EpisodeResult) -> Exit {
+    match &result.report.ending {
+        _ if result.solved => Exit::Success,
+        Ending::GaveUp { .. } => Exit::GaveUp,
+        Ending::NotUnderstood { .. } => Exit::Unusable,
+        Ending::Interrupted => Exit::Interrupted,
+        Ending::Done | Ending::Broken { .. } => Exit::Failed,
+    }
+}
+
+fn exit_of_range(results: &[EpisodeResult], asked: usize) -> Exit {
+    let exits: Vec<Exit> = results.iter().map(exit_of).collect();
+    if exits.contains(&Exit::Interrupted) {
+        return Exit::Interrupted;
+    }
+    if exits.len() == asked && exits.iter().all(|exit| *exit == Exit::Success) {
+        return Exit::Success;
+    }
+    let failed = exits.iter().any(|exit| !matches!(exit, Exit::Success | Exit::GaveUp));
+    if failed || exits.len() < asked { Exit::Failed } else { Exit::GaveUp }
+}
+
+/// How an episode ended, in words.
+pub fn ending_words(ending: &Ending) -> String {
+    match ending {
+        Ending::Done => "done".into(),
+        Ending::GaveUp { unknown, .. } => format!("gave up: {unknown}"),
+        Ending::NotUnderstood { reason } => format!("not understood: {reason}"),
+        Ending::Interrupted => "interrupted".into(),
+        Ending::Broken { reason } => format!("broken: {reason}"),
+    }
+}
+
+fn line(result: &EpisodeResult) -> String {
+    let word = match (result.solved, result.cause) {
+        (true, _) => "solved".to_string(),
+        (false, Some(cause)) => format!("NOT SOLVED ({})", cause.word()),
+        (false, None) => "NOT SOLVED".to_string(),
+    };
+    let faithful = match result.verdict.faithful {
+        Some(true) => "faithful yes",
+        Some(false) => "faithful no",
+        None => "",
+    };
+    format!(
+        "seed {:>6}  {word:<24} {faithful:<13} {:>5.1} s simulated {:>5.1} s wall {:>3} frames {:>2} skills  {}{}",
+        result.seed,
+        result.report.ended.seconds(),
+        result.wall_s,
+        result.report.frames_perceived,
+        result.report.steps.len(),
+        ending_words(&result.report.ending),
+        if result.solved { String::new() } else { format!(" | judge: {}", result.verdict.explanation) },
+    )
+}
+
+fn print_judgement(result: &EpisodeResult) -> anyhow::Result<()> {
+    let mut out = std::io::stdout().lock();
+    let verdict = &result.verdict;
+    let word = |holds: bool| if holds { "success" } else { "no success" };
+    writeln!(out, "judge     strict: {}; {}", word(verdict.strict), verdict.explanation)?;
+    if let Some(faithful) = verdict.faithful {
+        writeln!(out, "          faithful: {}", word(faithful))?;
+    }
+    for violation in &verdict.violations {
+        writeln!(out, "          violation: {violation}")?;
+    }
+    Ok(())
+}
+
+fn print_summary(runs: &Runs<'_>, asked: usize) -> anyhow::Result<()> {
+    let mut out = std::io::stdout().lock();
+    let (low, high) = wilson95(runs.solved, asked);
+    writeln!(
+        out,
+        "{} ({}, on-unknown {}, sensor {}): {} of {asked} solved (strict), 95 % interval {:.1} to {:.1} %",
+        runs.scenario,
+        runs.method,
+        runs.on_unknown,
+        runs.sensor,
+        runs.solved,
+        100.0 * low,
+        100.0 * high
+    )?;
+    writeln!(
+        out,
+        "  faithful {}; false successes {}; gave up {}; not finished {}; {} distinct worlds",
+        runs.faithful,
+        runs.false_successes,
+        runs.gave_up,
+        asked - runs.episodes.len(),
+        runs.distinct_worlds
+    )?;
+    if !runs.causes.is_empty() {
+        let causes: Vec<String> = runs.causes.iter().map(|(cause, count)| format!("{cause} {count}")).collect();
+        writeln!(out, "  failures by cause: {}", causes.join(", "))?;
+    }
+    let wall: Vec<f64> = runs.episodes.iter().map(|e| e.wall_s).collect();
+    let frames: Vec<f64> = runs.episodes.iter().map(|e| f64::from(e.report.frames_perceived)).collect();
+    let ((wall50, wall_max), (frames50, frames_max)) = (median_and(1.0, &wall), median_and(1.0, &frames));
+    writeln!(out, "  wall per episode: median {wall50:.1} s, longest {wall_max:.1} s; frames perceived: median {frames50:.0}, most {frames_max:.0}")?;
+    Ok(())
+}
+
+/// The table of where the time goes.
+fn print_times(results: &[EpisodeResult]) -> anyhow::Result<()> {
+    let mut sums: BTreeMap<&str, f64> = BTreeMap::new();
+    for (name, seconds) in results.iter().flat_map(|result| &result.spent_s) {
+        *sums.entry(name).or_default() += seconds;
+    }
+    let (episodes, total) = (results.len().max(1) as f64, results.iter().map(|r| r.wall_s).sum::<f64>());
+    sums.insert("messages and rest", (total - sums.values().sum::<f64>()).max(0.0));
+    let mut rows: Vec<_> = sums.into_iter().collect();
+    rows.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let mut out = std::io::stdout().lock();
+    writeln!(out, "  wall time per episode ({:.2} s):", total / episodes)?;
+    for (name, seconds) in rows.iter().filter(|(_, seconds)| *seconds > 0.0005 * episodes) {
+        writeln!(out, "    {name:<18} {:>8.3} s {:>5.1} %", seconds / episodes, 100.0 * seconds / total.max(1e-9))?;
+    }
+    Ok(())
+}
+
+/// The results of a range, as `--json` prints them.
+#[derive(Serialize)]
+struct Runs<'a> {
+    schema: &'static str,
+    scenario: &'a str,
+    method: &'a str,
+    on_unknown: &'static str,
+    sensor: String,
+    seeds: [u64; 2],
+    solved: usize,
+    faithful: usize,
+    false_successes: usize,
+    gave_up: usize,
+    distinct_worlds: usize,
+    causes: BTreeMap<&'static str, usize>,
+    episodes: &'a [EpisodeResult],
+}
+
+impl<'a> Runs<'a> {
+    fn new(scenario: &'a Scenario, args: &'a RunArgs, episodes: &'a [EpisodeResult]) -> Runs<'a> {
+        let count = |test: fn(&EpisodeResult) -> bool| episodes.iter().filter(|e| test(e)).count();
+        let mut causes = BTreeMap::new();
+        for cause in episodes.iter().filter_map(|e| e.cause) {
+            *causes.entry(cause.word()).or_default() += 1;
+        }
+        Runs {
+            schema: "acm.run/1",
+            scenario: scenario.name(),
+            method: &args.method,
+            on_unknown: match args.on_unknown {
+                crate::cli::OnUnknownArg::Abstain => "abstain",
+                crate::cli::OnUnknownArg::Guess => "guess",
+            },
+            sensor: args.sensor.clone().unwrap_or_else(|| scenario.sensor().into()),
+            seeds: [args.seed.first, args.seed.last],
+            solved: count(|e| e.solved),
+            faithful: count(|e| e.verdict.faithful == Some(true)),
+            false_successes: count(|e| e.false_success),
+            gave_up: count(|e| matches!(e.report.ending, Ending::GaveUp { .. })),
+            distinct_worlds: episodes.iter().map(|e| &e.world).collect::<BTreeSet<_>>().len(),
+            causes,
+            episodes,
+        }
+    }
+}

@@ -1,0 +1,58 @@
+//! `acm scenario`: list, check, describe, draw.
+
+use crate::cli::{Exit, ScenarioCommand};
+use acm_sim::{Scenario, SimOptions, Simulation};
+use anyhow::Context;
+use std::{
+    io::Write,
+    path::Path,
+    sync::{Arc, Mutex},
+};
+
+/// Runs `acm scenario`.
+pub fn run(command: &ScenarioCommand) -> anyhow::Result<Exit> {
+    match command {
+        ScenarioCommand::List => list()?,
+        ScenarioCommand::Check { file } => {
+            let scenario = Scenario::open(file)?;
+            println!("{file}: scenario `{}` is well formed: {}", scenario.name(), scenario.summary());
+        }
+        ScenarioCommand::Schema => println!("{}", Scenario::schema()),
+        ScenarioCommand::Preview { file, seed, out, info } => preview(file, *seed, out, *info)?,
+    }
+    Ok(Exit::Success)
+}
+
+fn list() -> anyhow::Result<()> {
+    let mut out = std::io::stdout().lock();
+    for name in Scenario::names() {
+        let scenario = Scenario::open(&name)?;
+        writeln!(out, "{name:<28} {}", scenario.summary())?;
+    }
+    Ok(())
+}
+
+fn preview(file: &str, seed: u64, out: &Path, info: bool) -> anyhow::Result<()> {
+    let scenario = Scenario::open(file)?;
+    let renderer = Arc::new(Mutex::new(acm_render::Renderer::new()?));
+    let options = SimOptions { seed, motion: true, ..SimOptions::default() };
+    let simulation = Simulation::new(&scenario, &options, renderer)?;
+    let image = simulation.preview()?;
+    image.save(out).with_context(|| format!("the picture {} cannot be written", out.display()))?;
+    println!("{} seed {seed} -> {}", scenario.name(), out.display());
+    if info {
+        for object in simulation.truth() {
+            let at = object.pose.translation;
+            println!(
+                "  {:<12} {:<14} at ({:.3}, {:.3}, {:.3}) heading {:.1} deg",
+                object.name,
+                object.model,
+                at.x,
+                at.y,
+                at.z,
+                object.pose.yaw().to_degrees()
+            );
+        }
+    }
+    Ok(())
+}
