@@ -12,11 +12,11 @@ const COUNT: f32 = (WINDOW * WINDOW) as f32;
 /// The white noise below is uniform; a sum of 25 of them is normal for our purpose. Sums are exact integers, so
 /// nothing drifts from row to row. Only the rows under the window are kept.
 pub(crate) struct SmoothNoise {
-    width: usize,
     white: Vec<u8>,
     /// The last rows, summed along the row.
     ring: [Vec<u16>; WINDOW],
     oldest: usize,
+    fresh: Vec<u16>,
     sums: Vec<u16>,
 }
 
@@ -24,10 +24,10 @@ impl SmoothNoise {
     pub(crate) fn new(width: usize, rng: &mut ChaCha8Rng) -> SmoothNoise {
         let row = || vec![0; width];
         let mut noise = SmoothNoise {
-            width,
             white: vec![0; width + WINDOW - 1],
             ring: std::array::from_fn(|_| row()),
             oldest: 0,
+            fresh: row(),
             sums: row(),
         };
         for _ in 0..WINDOW - 1 {
@@ -48,13 +48,19 @@ impl SmoothNoise {
 
     fn advance(&mut self, rng: &mut ChaCha8Rng) {
         rng.fill_bytes(&mut self.white);
-        let row = &mut self.ring[self.oldest];
+        let kept = &mut self.ring[self.oldest];
         self.oldest = (self.oldest + 1) % WINDOW;
-        for (column, (sum, kept)) in self.sums.iter_mut().zip(row).enumerate().take(self.width) {
-            let window = &self.white[column..column + WINDOW];
-            let fresh: u16 = window.iter().map(|&byte| u16::from(byte)).sum();
-            *sum = *sum + fresh - *kept;
-            *kept = fresh;
+        // One column of the window after the other, each over the whole row: the compiler can take many
+        // at a time. 25 bytes fit 16 bits; wrapping only spares the check.
+        self.fresh.fill(0);
+        for offset in 0..WINDOW {
+            for (sum, byte) in self.fresh.iter_mut().zip(&self.white[offset..]) {
+                *sum = sum.wrapping_add(u16::from(*byte));
+            }
+        }
+        for ((sum, fresh), kept) in self.sums.iter_mut().zip(&self.fresh).zip(kept) {
+            *sum = sum.wrapping_add(*fresh).wrapping_sub(*kept);
+            *kept = *fresh;
         }
     }
 }

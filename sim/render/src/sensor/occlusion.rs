@@ -16,28 +16,29 @@ impl Occlusion {
     /// Every pixel moves left by its disparity into the second image, where the largest disparity wins; whoever
     /// finds a larger one in its place is hidden.
     pub(crate) fn mark(&mut self, disparity: &[f32], hidden: &mut [bool]) {
-        // A disparity may be as large as we like for a thing at the near plane; beyond the row it hides nothing.
         let width = disparity.len();
-        let place = |column: usize, d: f32| (column as f32 - d + width as f32).floor();
         self.nearest.clear();
         self.nearest.resize(2 * width + 2, 0.0);
         for (column, &d) in disparity.iter().enumerate() {
-            let at = place(column, d);
-            if at < 0.0 {
-                continue;
-            }
+            let Some(at) = place(column, d, width) else { continue };
             // A pixel lands between two; taking both closes the gaps of surfaces that the second imager sees wider.
-            for slot in self.nearest.iter_mut().skip(at as usize).take(2) {
-                *slot = slot.max(d);
+            if let Some(slots) = self.nearest.get_mut(at..at + 2) {
+                slots[0] = slots[0].max(d);
+                slots[1] = slots[1].max(d);
             }
         }
         for (column, (&d, hidden)) in disparity.iter().zip(hidden).enumerate() {
-            let at = place(column, d);
-            let in_front = if at < 0.0 { None } else { self.nearest.get(at as usize) };
-            let behind = in_front.is_some_and(|&front| front > d + MARGIN_PX);
-            *hidden = behind;
+            let front = place(column, d, width).and_then(|at| self.nearest.get(at));
+            *hidden = front.is_some_and(|&front| front > d + MARGIN_PX);
         }
     }
+}
+
+/// Where a pixel lands in the second image, which begins one width further left than the first. `None` for what is
+/// so near that it lands outside; nothing far lands there, so it hides nothing.
+fn place(column: usize, disparity: f32, width: usize) -> Option<usize> {
+    let at = (column + width) as f32 - disparity;
+    (at >= 0.0).then_some(at as usize)
 }
 
 #[cfg(test)]
