@@ -9,10 +9,46 @@
 //! | [`entry`] | what the dynamic memories store: objects with history, transitions, skills, task progress |
 //! | [`observation`] | what memory is told, and what it answers about identities |
 //! | [`query`] | what memory can be asked, and its answers with their reasons |
+//! | [`event`] | the events of which memory is the sum; the log's content |
+//! | [`geometry`], [`scene`], [`moves`] | shapes, relations between them, moves read out of a history |
+//! | [`inspect`] | small summaries for people and tools |
+//!
+//! [`AcmMemory`] is the implementation, in memory or over a folder; the library of templates comes from
+//! [`default_library`] or [`library_from_dir`].
 
+mod belief;
+mod draft;
 pub mod entry;
+pub mod event;
+mod execute;
+mod expect;
+mod fusion;
+pub mod geometry;
+mod hand;
+mod identity;
+pub mod inspect;
+mod library;
+mod log;
+mod memory;
+pub mod moves;
 pub mod observation;
+mod observe;
 pub mod query;
+mod recall;
+mod retrieve;
+pub mod scene;
+mod skill;
+#[cfg(any(test, feature = "staging"))]
+pub mod staging;
+mod state;
 mod traits;
+mod view;
 
+pub use hand::HandFeeling;
+pub use identity::{IdentityRule, MAX_PERCEPTS};
+pub use library::{LibraryError, MAX_TEMPLATE_FILES, default_library, library_from_dir};
+pub use log::{FORMAT, MAX_LOG_BYTES};
+pub use memory::AcmMemory;
+pub use state::{MAX_HISTORY, MAX_OBJECTS, MAX_SKILLS, MAX_TRANSITIONS};
 pub use traits::{Memory, MemoryError, MemoryView};
+pub use view::Snapshot;

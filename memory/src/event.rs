@@ -1,0 +1,169 @@
+//! The events of which memory is the sum. What is decided is written, not what was read: a log stays readable
+//! when the rules that decide are improved. The format is described in docs/memory-format.md.
+
+use crate::{
+    entry::{HistoryEntry, Moment, ObjectEntry, SkillEntry, Transition, TransitionResult},
+    hand::HandFeeling,
+};
+use acm_concept::{
+    ids::{FrameId, ObjectId, TransitionId},
+    literal::{Evidence, Literal},
+    object::{GroundedPart, SupportPlane, Visibility},
+    pose::Pose,
+};
+use serde::{Deserialize, Serialize};
+
+/// One change of memory.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Event {
+    /// When it came to be believed.
+    pub moment: Moment,
+    /// Where it comes from.
+    pub source: Source,
+    /// What it rests on.
+    pub evidence: Vec<Evidence>,
+    /// The change.
+    pub change: Change,
+}
+
+/// Where a change comes from.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Source {
+    /// A camera, by name.
+    Camera(String),
+    /// The robot's own report of what it did and felt.
+    Robot,
+    /// The agent that keeps this memory: its instruction, its progress, its verifier.
+    Agent,
+}
+
+/// What changed.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Change {
+    /// A run began.
+    EpisodeBegan,
+    /// The instruction was given.
+    Instructed {
+        /// The instruction.
+        text: String,
+    },
+    /// A subtask was found done.
+    SubtaskDone {
+        /// Its index, from 0.
+        index: u32,
+    },
+    /// A frame was taken.
+    Frame(Glance),
+    /// The surface on which things stand was seen.
+    Support(SupportPlane),
+    /// An object as it is believed from now on: new, or in place of what was believed. Its history is left out;
+    /// while it stays where it is, the last entry of its history follows its pose.
+    Object(Box<Believed>),
+    /// An object's place changed.
+    History {
+        /// The object.
+        object: ObjectId,
+        /// What is added to its history.
+        entry: HistoryEntry,
+    },
+    /// A skill was executed.
+    Transition(Box<Transition>),
+    /// A transition was compared with what was seen.
+    Settled {
+        /// The transition.
+        transition: TransitionId,
+        /// How it ended.
+        result: TransitionResult,
+        /// State literals after it.
+        after: Vec<Literal>,
+    },
+    /// A skill entry as it is from now on.
+    Skill(Box<SkillEntry>),
+    /// Some of memory was dropped.
+    Forgotten(Forget),
+    /// Everything dynamic was dropped; ids go on where they were, so that none is ever given twice.
+    Wiped(Counters),
+}
+
+/// An object without its history, with what memory tracks beside the entry.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Believed {
+    /// The entry; its history is empty here.
+    pub entry: ObjectEntry,
+    /// The rest.
+    pub track: Track,
+}
+
+/// What is known of an object beside its entry: the state of the tests that it still has to pass.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Track {
+    /// How often in a row it was seen to be absent from its place.
+    pub absences: u32,
+    /// A view that contradicts the entry and has to be repeated before it is believed.
+    pub pending: Option<Pending>,
+    /// How it sits in the hand (base frame in the TCP frame), where it is held and that is known.
+    pub grip: Option<Pose>,
+    /// The own action that is believed to have left it here, until it is seen here.
+    pub unconfirmed: Option<TransitionId>,
+    /// Whether an own action may have shifted it since it was last seen.
+    pub disturbed: bool,
+}
+
+/// A view that contradicts what is believed.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Pending {
+    /// The parts as that view has them.
+    pub parts: Vec<GroundedPart>,
+    /// How many views in a row agreed on it.
+    pub views: u32,
+}
+
+/// A frame and what of it is kept.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Glance {
+    /// The frame.
+    pub frame: FrameId,
+    /// Whether it showed anything.
+    pub showed: bool,
+    /// Pose of the hand when it was taken.
+    pub tcp: Pose,
+    /// What the fingers felt.
+    pub hand: HandFeeling,
+    /// What it said of the objects that were expected.
+    pub visibility: Vec<(ObjectId, Visibility)>,
+}
+
+/// What to drop from memory.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Forget {
+    /// Objects to drop.
+    pub objects: Vec<ObjectId>,
+    /// Whether to drop all of every history but the present place.
+    pub histories: bool,
+    /// Drop the transitions before this one.
+    pub transitions_before: Option<TransitionId>,
+    /// Whether to drop skill memory.
+    pub skills: bool,
+}
+
+/// The ids that come next.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Counters {
+    /// Number of the episode; 0 before the first.
+    pub episode: u32,
+    /// Next object.
+    pub object: u64,
+    /// Next transition.
+    pub transition: u64,
+    /// Next skill entry.
+    pub skill: u64,
+}
+
+impl Default for Counters {
+    fn default() -> Self {
+        Counters { episode: 0, object: 1, transition: 1, skill: 1 }
+    }
+}

@@ -1,0 +1,192 @@
+//! The memory itself: decides what each call changes, commits it as one batch, and hands out snapshots.
+
+use crate::{
+    draft::Draft,
+    event::{Change, Counters, Event, Forget, Source},
+    execute, expect,
+    identity::IdentityRule,
+    log::Log,
+    observation::{Executed, Grounding, Note, Observation, Verdict},
+    observe,
+    state::State,
+    traits::{Memory, MemoryError, MemoryView},
+    view::Snapshot,
+};
+use acm_concept::{expectation::Expectation, ids::TransitionId, template::TemplateLibrary, time::Time};
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+/// Analytic concept-centric memory: object, scene, transition and skill memory over a library of templates.
+///
+/// ```
+/// use acm_memory::{AcmMemory, Memory, observation::Note};
+/// let library = std::sync::Arc::new(acm_memory::default_library().unwrap());
+/// let mut memory = AcmMemory::in_memory(library);
+/// memory.note(&Note::EpisodeBegan).unwrap();
+/// assert!(memory.view().objects().is_empty());
+/// ```
+#[derive(Debug)]
+pub struct AcmMemory {
+    library: Arc<TemplateLibrary>,
+    rule: IdentityRule,
+    state: State,
+    log: Option<Log>,
+}
+
+impl AcmMemory {
+    /// A memory that ends with the process.
+    pub fn in_memory(library: Arc<TemplateLibrary>) -> AcmMemory {
+        AcmMemory { library, rule: IdentityRule::Global, state: State::default(), log: None }
+    }
+    /// Creates a memory folder or continues the one that is there. What a crash left unacknowledged is cut off.
+    pub fn open(dir: &Path, library: Arc<TemplateLibrary>) -> Result<AcmMemory, MemoryError> {
+        let (log, events) = Log::open(dir)?;
+        let mut state = State::default();
+        for (number, event) in (0u64..).zip(&events) {
+            state.apply(event).map_err(|reason| MemoryError::Record {
+                path: log.path().into(),
+                record: number,
+                reason,
+            })?;
+        }
+        Ok(AcmMemory { library, rule: IdentityRule::Global, state, log: Some(log) })
+    }
+    /// The same memory with another identity rule.
+    pub fn with_identity(self, rule: IdentityRule) -> AcmMemory {
+        AcmMemory { rule, ..self }
+    }
+    /// Drops a part of memory. The log keeps the events that told of it; see [`Memory::wipe`] for removing all.
+    pub fn forget(&mut self, forget: &Forget) -> Result<(), MemoryError> {
+        let mut draft = self.draft(Source::Agent);
+        draft.emit(Vec::new(), Change::Forgotten(forget.clone()));
+        let (state, events, fault) = (draft.state, draft.events, draft.fault);
+        self.commit(state, events, fault)
+    }
+    /// The present view, with what only this memory can be asked.
+    pub fn snapshot(&self) -> Snapshot {
+        Snapshot::new(self.state.clone(), self.library.clone())
+    }
+    /// Objects that the last frame showed, and those in the hand.
+    pub fn present_in_last_frame(&self) -> Vec<acm_concept::ids::ObjectId> {
+        let last = self.state.glance.as_ref().filter(|glance| glance.showed).map(|glance| glance.frame);
+        let shown = |entry: &&crate::entry::ObjectEntry| {
+            let seen = last.is_some() && entry.last_frame == last && entry.last_seen.episode == self.state.next.episode;
+            seen || entry.presence == crate::entry::Presence::Held
+        };
+        self.state.objects.iter().filter(shown).map(|entry| entry.id).collect()
+    }
+
+    fn draft(&self, source: Source) -> Draft<'_> {
+        Draft::new(&self.state, &self.library, source)
+    }
+
+    /// Writes a batch to the log, then takes over the state that it leads to.
+    fn commit(&mut self, state: State, events: Vec<Event>, fault: Option<String>) -> Result<(), MemoryError> {
+        self.check(&events, fault)?;
+        if let Some(log) = &mut self.log {
+            log.append(&events)?;
+        }
+        self.state = state;
+        Ok(())
+    }
+
+    /// Refuses a batch that could not be read back: it would make the whole log unreadable.
+    fn check(&self, events: &[Event], fault: Option<String>) -> Result<(), MemoryError> {
+        let refuse = |reason| {
+            let path = self.log.as_ref().map_or_else(|| PathBuf::from("(in memory)"), |log| log.path().into());
+            Err(MemoryError::Record { path, record: 0, reason })
+        };
+        if let Some(reason) = fault {
+            return refuse(reason);
+        }
+        // Reports come from outside whole; frames were checked number by number when they were read.
+        for event in
+            events.iter().filter(|event| matches!(event.change, Change::Transition(_) | Change::Settled { .. }))
+        {
+            let same = serde_json::to_vec(event).and_then(|bytes| serde_json::from_slice::<Event>(&bytes));
+            match same {
+                Ok(same) if same == *event => {}
+                Ok(_) => {
+                    return refuse("a report does not survive being written: it has a number that is not finite".into());
+                }
+                Err(source) => return refuse(format!("a report has a number that is not finite: {source}")),
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Memory for AcmMemory {
+    fn name(&self) -> &str {
+        match self.rule {
+            IdentityRule::Global => "acm",
+            IdentityRule::Paper => "paper-identity",
+        }
+    }
+    fn expect(&self, now: Time) -> Expectation {
+        expect::expect(&self.state, now)
+    }
+    fn observe(&mut self, observation: &Observation<'_>) -> Result<Grounding, MemoryError> {
+        let mut draft = self.draft(Source::Camera(observation.percepts.frame.camera.clone()));
+        let grounding = observe::observe(&mut draft, observation, self.rule);
+        let (state, events, fault) = (draft.state, draft.events, draft.fault);
+        self.commit(state, events, fault)?;
+        Ok(grounding)
+    }
+    fn record(&mut self, executed: &Executed) -> Result<TransitionId, MemoryError> {
+        let mut draft = self.draft(Source::Robot);
+        let id = execute::record(&mut draft, executed);
+        let (state, events, fault) = (draft.state, draft.events, draft.fault);
+        self.commit(state, events, fault)?;
+        Ok(id)
+    }
+    fn settle(&mut self, transition: TransitionId, verdict: &Verdict) -> Result<(), MemoryError> {
+        let known = self.state.transition(transition).cloned().ok_or(MemoryError::UnknownTransition(transition))?;
+        let mut draft = self.draft(Source::Agent);
+        execute::settle(&mut draft, &known, verdict);
+        let (state, events, fault) = (draft.state, draft.events, draft.fault);
+        self.commit(state, events, fault)
+    }
+    fn note(&mut self, note: &Note) -> Result<(), MemoryError> {
+        let mut draft = self.draft(Source::Agent);
+        match note {
+            // The first note may have begun the first run already.
+            Note::EpisodeBegan if !draft.events.is_empty() => {}
+            Note::EpisodeBegan => draft.begin_episode(),
+            Note::Instructed { time, text } => {
+                draft.at(*time);
+                draft.emit(Vec::new(), Change::Instructed { text: text.clone() });
+            }
+            Note::SubtaskDone { time, index } => {
+                draft.at(*time);
+                draft.emit(Vec::new(), Change::SubtaskDone { index: *index });
+            }
+        }
+        let (state, events, fault) = (draft.state, draft.events, draft.fault);
+        self.commit(state, events, fault)
+    }
+    /// The log is replaced by one that holds the wipe alone, so that nothing of what was forgotten is left in it.
+    fn wipe(&mut self) -> Result<(), MemoryError> {
+        let counters: Counters = self.state.next;
+        let event = Event {
+            moment: self.state.moment(),
+            source: Source::Agent,
+            evidence: Vec::new(),
+            change: Change::Wiped(counters),
+        };
+        let mut state = State::default();
+        let fault = state.apply(&event).err();
+        let events = [event];
+        self.check(&events, fault)?;
+        if let Some(log) = &mut self.log {
+            log.replace(&events)?;
+        }
+        self.state = state;
+        Ok(())
+    }
+    fn view(&self) -> Arc<dyn MemoryView> {
+        Arc::new(self.snapshot())
+    }
+}

@@ -1,0 +1,376 @@
+//! Takes a grounded frame: identities, then what each percept, and each absence, changes.
+
+use crate::{
+    draft::{Draft, Stage, Staged},
+    entry::{Moment, ObjectEntry, PlaceCause, Presence},
+    event::{Change, Glance, Pending},
+    fusion,
+    hand::HandFeeling,
+    identity::{self, IdentityRule, MAX_PERCEPTS, Match, Percept, predict},
+    observation::{Grounding, Observation, Resolved},
+    scene,
+    state::MAX_OBJECTS,
+};
+use acm_concept::{
+    ids::ObjectId,
+    literal::Evidence,
+    object::{ExpectedView, GroundedPart, SupportPlane, Visibility},
+    pose::Pose,
+};
+use glam::DVec3;
+
+/// Percepts below this confidence that fit nothing remembered are held to be false alarms.
+const FALSE_ALARM: f64 = 0.15;
+/// Percepts below this confidence change nothing that is believed.
+const LOW_CONFIDENCE: f64 = 0.3;
+/// Squared Mahalanobis distance within which an object is still in its place (three degrees of freedom, 0.1 %).
+const PLACE_GATE: f64 = 16.0;
+/// A thing that is found within this distance of its place has not moved, metres.
+pub(crate) const MOVED_M: f64 = 0.02;
+/// A share of the predicted pixels that were looked through that is strong evidence of absence.
+const STRONG_ABSENCE: f64 = 0.5;
+/// A share that is enough on its own.
+const CERTAIN_ABSENCE: f64 = 0.8;
+/// Matches above this probability may verify an object.
+const SURE_MATCH: f64 = 0.6;
+
+/// Takes a frame into the draft.
+pub(crate) fn observe(draft: &mut Draft<'_>, observation: &Observation<'_>, rule: IdentityRule) -> Grounding {
+    let percepts = observation.percepts;
+    draft.at(percepts.frame.time);
+    let evidence = [Evidence::Frame(percepts.frame.id)];
+    draft.emit(evidence.to_vec(), Change::Frame(glance(observation)));
+    let mut stage = Stage::default();
+    follow_hand(draft, &mut stage);
+    let mut grounding = Grounding::default();
+    if percepts.blindness.is_none() {
+        if let Some(plane) = percepts.support.filter(|plane| differs(plane, draft.state.support.as_ref())) {
+            draft.emit(evidence.to_vec(), Change::Support(plane));
+        }
+        let read = |(index, object)| Percept::read(index, object, draft.library);
+        let readable: Vec<Percept<'_>> =
+            percepts.objects.iter().take(MAX_PERCEPTS).enumerate().filter_map(read).collect();
+        let matches = identity::resolve(rule, &draft.state, &readable, &percepts.expected, draft.library);
+        let mut frame = Frame { draft, stage, views: &percepts.expected, percepts: &readable, grounding };
+        frame.take_matches(&matches, PlaceCause::Seen(percepts.frame.id));
+        frame.take_absences(PlaceCause::Gone(percepts.frame.id));
+        (stage, grounding) = (frame.stage, frame.grounding);
+        scene::settle_supports(&mut stage, &draft.state, draft.library, PlaceCause::Seen(percepts.frame.id));
+    }
+    draft.emit_stage(stage, &evidence);
+    grounding
+}
+
+fn glance(observation: &Observation<'_>) -> Glance {
+    let percepts = observation.percepts;
+    let tcp = observation.feedback.tcp;
+    Glance {
+        frame: percepts.frame.id,
+        showed: percepts.blindness.is_none(),
+        // Numbers that are not finite have no place in the log.
+        tcp: if tcp.is_valid() { tcp } else { Pose::IDENTITY },
+        hand: HandFeeling::from_feedback(observation.feedback),
+        visibility: percepts.expected.iter().map(|view| (view.object, view.visibility)).collect(),
+    }
+}
+
+/// What is held moves with the hand, and is held no longer when the fingers feel nothing.
+fn follow_hand(draft: &Draft<'_>, stage: &mut Stage) {
+    let state = &draft.state;
+    let Some(held) = state.held() else { return };
+    let (parts, _) = predict::predicted_parts(state, held, &state.track(held.id));
+    let Some(staged) = stage.touch(state, held.id) else { return };
+    staged.entry.parts = parts;
+    if state.hand == HandFeeling::Empty {
+        lose_grip(staged);
+    }
+}
+
+/// The object is no longer in the hand and nobody knows where it is.
+pub(crate) fn lose_grip(staged: &mut Staged) {
+    staged.entry.presence = Presence::Missing;
+    staged.entry.support = None;
+    staged.track.grip = None;
+}
+
+fn differs(plane: &SupportPlane, known: Option<&SupportPlane>) -> bool {
+    let color = &plane.appearance;
+    let numbers = [plane.offset_m, plane.residual_m, color.mean.l, color.mean.a, color.mean.b, color.spread];
+    let sane = plane.normal.is_normalized() && numbers.iter().all(|number| number.is_finite());
+    sane && known.is_none_or(|known| {
+        (known.offset_m - plane.offset_m).abs() > 0.001 || known.normal.angle_between(plane.normal) > 0.003
+    })
+}
+
+/// One frame on its way into memory.
+struct Frame<'f, 'a, 'p> {
+    draft: &'f mut Draft<'a>,
+    stage: Stage,
+    views: &'f [ExpectedView],
+    percepts: &'f [Percept<'p>],
+    grounding: Grounding,
+}
+
+impl Frame<'_, '_, '_> {
+    fn take_matches(&mut self, matches: &[Match], cause: PlaceCause) {
+        let percepts = self.percepts;
+        for found in matches {
+            let Some(percept) = percepts.get(found.percept) else { continue };
+            let resolved = match found.object {
+                Some(id) => self.take_known(id, percept, found, cause),
+                None => self.take_new(percept, found, matches, cause),
+            };
+            self.grounding.resolved.extend(resolved);
+        }
+    }
+
+    fn take_known(
+        &mut self,
+        id: ObjectId,
+        percept: &Percept<'_>,
+        found: &Match,
+        cause: PlaceCause,
+    ) -> Option<Resolved> {
+        let moment = self.draft.moment();
+        let seen_through = self.views.iter().any(|v| v.object == id && v.visibility == Visibility::SeenThrough);
+        let confused = self.confused_with(id);
+        let library = self.draft.library;
+        let staged = self.stage.touch(&self.draft.state, id)?;
+        let earlier_run = staged.entry.last_seen.episode < moment.episode;
+        let low = percept.object.confidence < LOW_CONFIDENCE;
+        let verdict = if low { View::Rejected } else { judge(staged, percept, seen_through || earlier_run, library) };
+        let accepted = !matches!(verdict, View::Rejected | View::Pending(_));
+        let own = staged.track.unconfirmed.is_some() || staged.track.disturbed;
+        match verdict {
+            View::Rejected => {}
+            View::Pending(pending) => staged.track.pending = Some(pending),
+            View::InHand => remember_view(&mut staged.entry, percept, moment),
+            View::InPlace(parts) => {
+                let back = staged.entry.presence == Presence::Missing;
+                staged.entry.verified = !back && (staged.entry.verified || found.probability >= SURE_MATCH);
+                settle_place(staged, parts, back.then_some(cause));
+                remember_view(&mut staged.entry, percept, moment);
+            }
+            View::Moved(parts) => {
+                // An own action and a view of its outcome are two witnesses; one view alone is not.
+                staged.entry.verified = own && found.probability >= SURE_MATCH;
+                settle_place(staged, parts, Some(cause));
+                remember_view(&mut staged.entry, percept, moment);
+                if !own {
+                    self.grounding.moved.push(id);
+                }
+            }
+        }
+        if accepted {
+            staged.entry.last_frame = Some(frame_of(cause)?);
+            if !found.alternatives.is_empty() {
+                staged.entry.ambiguous_with.clone_from(&found.alternatives);
+            } else if staged.placed.is_some() {
+                staged.entry.ambiguous_with = confused;
+            }
+        }
+        let probability = found.probability;
+        Some(Resolved { percept: percept.index, object: id, new: false, probability, accepted })
+    }
+
+    /// Present objects that may in truth be this one: their doubt is this one's too.
+    fn confused_with(&self, id: ObjectId) -> Vec<(ObjectId, f64)> {
+        let doubt = |entry: &&ObjectEntry| {
+            entry.ambiguous_with.iter().find(|(other, _)| *other == id).map(|(_, probability)| (entry.id, *probability))
+        };
+        self.stage.entries(&self.draft.state).iter().filter(|entry| entry.id != id).filter_map(doubt).collect()
+    }
+
+    fn take_new(
+        &mut self,
+        percept: &Percept<'_>,
+        found: &Match,
+        matches: &[Match],
+        cause: PlaceCause,
+    ) -> Option<Resolved> {
+        let object = percept.object;
+        let full = self.draft.state.objects.len() + self.stage.added() >= MAX_OBJECTS;
+        if object.confidence < FALSE_ALARM || full || self.is_fragment(percept, matches) {
+            return None;
+        }
+        let id = ObjectId(self.draft.state.next.object + self.stage.added() as u64);
+        let own_category = || vec![(object.category.clone(), object.confidence)];
+        let entry = ObjectEntry {
+            id,
+            category: object.category.clone(),
+            categories: if object.categories.is_empty() { own_category() } else { object.categories.clone() },
+            parts: percept.parts.clone(),
+            appearance: object.appearance,
+            presence: Presence::Present,
+            support: None,
+            state: Vec::new(),
+            confidence: object.confidence,
+            verified: false,
+            last_seen: self.draft.moment(),
+            last_frame: Some(frame_of(cause)?),
+            views: 1,
+            ambiguous_with: found.alternatives.clone(),
+            history: Vec::new(),
+        };
+        self.stage.add(entry, cause);
+        let probability = found.probability;
+        Some(Resolved { percept: percept.index, object: id, new: true, probability, accepted: true })
+    }
+
+    /// Whether a newcomer lies inside something that this frame shows as well: two solids cannot share a place,
+    /// so it is a piece of that.
+    fn is_fragment(&self, percept: &Percept<'_>, matches: &[Match]) -> bool {
+        let body = &percept.body;
+        let matched = |index: usize| matches.iter().any(|m| m.percept == index && m.object.is_some());
+        self.percepts.iter().enumerate().any(|(index, other)| {
+            let shared = body.top_m.min(other.body.top_m) - body.base_m.max(other.body.base_m);
+            other.index != percept.index
+                && matched(index)
+                && other.body.area() > body.area()
+                && other.body.covers(body.centre, 0.0)
+                // Flat things under a block sink into it by the camera's error.
+                && body.height() > 0.005
+                && shared > 0.5 * body.height()
+        })
+    }
+
+    fn take_absences(&mut self, cause: PlaceCause) {
+        for view in self.views {
+            let matched = self.grounding.resolved.iter().any(|found| found.object == view.object && found.accepted);
+            let Some(entry) = self.stage.entry(&self.draft.state, view.object) else { continue };
+            if matched || entry.presence != Presence::Present {
+                continue;
+            }
+            let absences = self.draft.state.track(view.object).absences;
+            match view.visibility {
+                Visibility::Seen if absences == 0 => continue,
+                Visibility::Seen | Visibility::SeenThrough => {}
+                Visibility::Occluded | Visibility::OutOfView | Visibility::NotMeasured => continue,
+            }
+            let Some(staged) = self.stage.touch(&self.draft.state, view.object) else { continue };
+            if view.visibility == Visibility::Seen {
+                staged.track.absences = 0;
+                continue;
+            }
+            let fraction = view.fraction.clamp(0.0, 1.0);
+            staged.track.absences += u32::from(fraction >= STRONG_ABSENCE);
+            staged.entry.confidence *= 1.0 - 0.5 * fraction;
+            if staged.track.absences >= 2 || fraction > CERTAIN_ABSENCE {
+                staged.entry.presence = Presence::Missing;
+                staged.entry.support = None;
+                staged.left = Some(cause);
+                staged.placed = None;
+                self.grounding.missing.push(view.object);
+            }
+        }
+    }
+}
+
+/// What a view of a known object is worth.
+enum View {
+    /// Nothing: it is too unsure.
+    Rejected,
+    /// It contradicts what is believed and has to be repeated.
+    Pending(Pending),
+    /// It shows the object in the hand.
+    InHand,
+    /// It shows the object in its place; the parts with the view fused in.
+    InPlace(Vec<GroundedPart>),
+    /// It shows the object elsewhere; the parts as they are there.
+    Moved(Vec<GroundedPart>),
+}
+
+fn judge(
+    staged: &Staged,
+    percept: &Percept<'_>,
+    may_have_moved: bool,
+    library: &acm_concept::template::TemplateLibrary,
+) -> View {
+    let (entry, track) = (&staged.entry, &staged.track);
+    let in_place = is_in_place(entry, percept, library);
+    if entry.presence == Presence::Held && in_place {
+        return View::InHand;
+    }
+    let fused = fusion::fuse_parts(&entry.parts, &percept.parts, percept.object.truncated, library);
+    let explained =
+        may_have_moved || entry.presence == Presence::Missing || track.disturbed || track.unconfirmed.is_some();
+    match fused {
+        Some(parts) if in_place => View::InPlace(parts),
+        Some(parts) if explained && percept.is_reliable() => View::Moved(relocated(parts, &percept.parts)),
+        fused => {
+            let agreed = track.pending.as_ref().filter(|pending| agrees(&pending.parts, percept, library));
+            let views = agreed.map_or(0, |pending| pending.views) + 1;
+            let needed = if entry.verified { 3 } else { 2 };
+            if views < needed || !percept.is_reliable() || percept.object.truncated {
+                return View::Pending(Pending { parts: percept.parts.clone(), views });
+            }
+            let parts = fused.map_or_else(|| percept.parts.clone(), |parts| relocated(parts, &percept.parts));
+            if in_place { View::InPlace(parts) } else { View::Moved(parts) }
+        }
+    }
+}
+
+/// Whether a view shows the object where it is believed to be, within the noise of both.
+fn is_in_place(entry: &ObjectEntry, percept: &Percept<'_>, library: &acm_concept::template::TemplateLibrary) -> bool {
+    let Some(known) = entry.parts.first().map(|part| &part.pose) else { return false };
+    let offset = percept.pose.pose.translation - known.pose.translation;
+    let slack = crate::geometry::Body::of(&entry.parts, library).map_or(0.0, |body| {
+        let (seen, known) = (percept.body.extents(), body.extents());
+        0.5 * (known[0] - seen[0]).max(known[1] - seen[1]).max(0.0)
+    });
+    let held = if entry.presence == Presence::Held { predict::HAND_SIGMA_M } else { 0.0 };
+    let square = |v: DVec3| v * v;
+    let variance = square(percept.pose.position_sigma_m)
+        + square(known.position_sigma_m)
+        + square(predict::VIEW_SIGMA_M)
+        + DVec3::splat(held * held)
+        + DVec3::new(slack * slack, slack * slack, 0.0);
+    let near = offset.truncate().length() <= MOVED_M && offset.z.abs() <= MOVED_M;
+    near || (offset * offset / variance).element_sum() <= PLACE_GATE
+}
+
+fn agrees(pending: &[GroundedPart], percept: &Percept<'_>, library: &acm_concept::template::TemplateLibrary) -> bool {
+    let near = pending.first().is_some_and(|part| {
+        let offset = part.pose.pose.translation - percept.pose.pose.translation;
+        let sigma = part.pose.position_sigma_m + percept.pose.position_sigma_m + predict::VIEW_SIGMA_M;
+        (offset * offset / (sigma * sigma)).element_sum() <= PLACE_GATE
+    });
+    near && fusion::fuse_parts(pending, &percept.parts, percept.object.truncated, library).is_some()
+}
+
+/// Parts with what was learned of their shape, at the poses of a view.
+fn relocated(mut parts: Vec<GroundedPart>, seen: &[GroundedPart]) -> Vec<GroundedPart> {
+    for (part, seen) in parts.iter_mut().zip(seen) {
+        part.pose = seen.pose;
+    }
+    parts
+}
+
+fn settle_place(staged: &mut Staged, parts: Vec<GroundedPart>, cause: Option<PlaceCause>) {
+    staged.entry.parts = parts;
+    staged.entry.presence = Presence::Present;
+    staged.placed = cause;
+    staged.track = Default::default();
+}
+
+/// What every accepted view adds, wherever it shows the object.
+fn remember_view(entry: &mut ObjectEntry, percept: &Percept<'_>, moment: Moment) {
+    let object = percept.object;
+    if !object.truncated && entry.presence != Presence::Held {
+        entry.appearance = fusion::fuse_appearance(&entry.appearance, &object.appearance, entry.views);
+        entry.categories = fusion::fuse_categories(&entry.categories, &object.categories, entry.views);
+        if let Some((best, _)) = entry.categories.first() {
+            entry.category.clone_from(best);
+        }
+    }
+    entry.confidence = (1.0 - (1.0 - entry.confidence) * (1.0 - 0.5 * object.confidence)).min(0.999);
+    entry.views = entry.views.saturating_add(1);
+    entry.last_seen = moment;
+}
+
+fn frame_of(cause: PlaceCause) -> Option<acm_concept::ids::FrameId> {
+    match cause {
+        PlaceCause::Seen(frame) | PlaceCause::Gone(frame) => Some(frame),
+        PlaceCause::Own(_) | PlaceCause::Grasped(_) => None,
+    }
+}
