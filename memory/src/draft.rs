@@ -7,7 +7,7 @@ use crate::{
     state::State,
 };
 use acm_concept::{ids::ObjectId, literal::Evidence, template::TemplateLibrary};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, btree_map::Entry};
 
 /// Events in the making. The state runs ahead of the log by them; if the log cannot take them, both are dropped.
 #[derive(Debug)]
@@ -101,13 +101,14 @@ pub(crate) struct Stage {
 impl Stage {
     /// The staged object, taken from the state when it is touched first.
     pub(crate) fn touch(&mut self, state: &State, id: ObjectId) -> Option<&mut Staged> {
-        if !self.objects.contains_key(&id) {
-            let known = state.object(id)?;
-            // The history is not copied: it does not change but by events of its own.
-            let entry = without_history(known);
-            self.objects.insert(id, Staged { entry, track: state.track(id), new: false, left: None, placed: None });
+        match self.objects.entry(id) {
+            Entry::Occupied(staged) => Some(staged.into_mut()),
+            Entry::Vacant(free) => {
+                // The history is not copied: it does not change but by events of its own.
+                let entry = without_history(state.object(id)?);
+                Some(free.insert(Staged { entry, track: state.track(id), new: false, left: None, placed: None }))
+            }
         }
-        self.objects.get_mut(&id)
     }
     /// Stages a new object.
     pub(crate) fn add(&mut self, entry: ObjectEntry, cause: PlaceCause) {

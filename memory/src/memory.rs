@@ -109,7 +109,9 @@ impl AcmMemory {
             match same {
                 Ok(same) if same == *event => {}
                 Ok(_) => {
-                    return refuse("a report does not survive being written: it has a number that is not finite".into());
+                    return refuse(
+                        "a report does not survive being written: it has a number that is not finite".into(),
+                    );
                 }
                 Err(source) => return refuse(format!("a report has a number that is not finite: {source}")),
             }
