@@ -41,6 +41,8 @@ mod skill;
 #[cfg(any(test, feature = "staging"))]
 pub mod staging;
 mod state;
+#[cfg(test)]
+mod tests;
 mod traits;
 mod view;
 

@@ -78,6 +78,11 @@ impl AcmMemory {
         self.state.objects.iter().filter(shown).map(|entry| entry.id).collect()
     }
 
+    #[cfg(test)]
+    pub(crate) fn state(&self) -> &State {
+        &self.state
+    }
+
     fn draft(&self, source: Source) -> Draft<'_> {
         Draft::new(&self.state, &self.library, source)
     }

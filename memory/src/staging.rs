@@ -13,8 +13,8 @@ use acm_concept::{
     ids::{FrameId, ObjectId, TransitionId},
     literal::{Literal, Place, Term, Truth},
     object::{
-        ExpectedView, GroundedObject, GroundedPart, Observability, ParameterEstimate, Percepts, PixelSupport,
-        PoseEstimate, SupportPlane, Visibility,
+        Blindness, ExpectedView, GroundedObject, GroundedPart, Observability, ParameterEstimate, Percepts,
+        PixelSupport, PoseEstimate, SupportPlane, Visibility,
     },
     pose::Pose,
     skill::{FailureCause, SkillInvocation, SkillReport},
@@ -67,8 +67,12 @@ impl Thing {
     /// A box with the given sides, metres.
     pub fn block([length, width, height]: [f64; 3]) -> Thing {
         let parameters = [("length", length), ("width", width), ("height", height)];
-        let cube = length.max(height) < 1.35 * width.min(height);
-        let nouns: &[&str] = if cube { &["cube", "block", "box"] } else { &["block", "box"] };
+        let cube = length.max(height) < 1.35 * width.min(height) && length < 0.12;
+        let nouns: &[&str] = match (cube, length < 0.15) {
+            (true, _) => &["cube", "block", "box"],
+            (false, true) => &["block", "box"],
+            (false, false) => &["box"],
+        };
         Thing::new("box", &parameters, &["graspable", "supportive"], &["pick", "place"], nouns)
     }
     /// An upright cylinder, metres.
@@ -184,22 +188,44 @@ pub fn look(
     views: &[(ObjectId, Visibility, f64)],
     hand: &Feedback,
 ) -> Result<Grounding, MemoryError> {
-    let header = header(frame, seconds);
     let view = |(object, visibility, fraction): &(ObjectId, Visibility, f64)| ExpectedView {
         object: *object,
         visibility: *visibility,
         fraction: *fraction,
     };
     let percepts = Percepts {
-        frame: header.clone(),
+        frame: header(frame, seconds),
         support: Some(table()),
         objects: things.iter().map(Thing::grounded).collect(),
         expected: views.iter().map(view).collect(),
         blindness: None,
         depth_fraction: 0.9,
     };
+    show(memory, &percepts, hand)
+}
+
+/// Shows a memory a frame without any depth.
+pub fn look_blind(
+    memory: &mut dyn Memory,
+    frame: u64,
+    seconds: f64,
+    hand: &Feedback,
+) -> Result<Grounding, MemoryError> {
+    let percepts = Percepts {
+        frame: header(frame, seconds),
+        support: None,
+        objects: Vec::new(),
+        expected: Vec::new(),
+        blindness: Some(Blindness::NoDepth),
+        depth_fraction: 0.0,
+    };
+    show(memory, &percepts, hand)
+}
+
+fn show(memory: &mut dyn Memory, percepts: &Percepts, hand: &Feedback) -> Result<Grounding, MemoryError> {
+    let header = percepts.frame.clone();
     let frame = RgbdFrame { header, color: Arc::from([0u8; 3].as_slice()), depth: Arc::from([0f32].as_slice()) };
-    memory.observe(&Observation { percepts: &percepts, frame: &frame, feedback: hand })
+    memory.observe(&Observation { percepts, frame: &frame, feedback: hand })
 }
 
 /// Begins a run and gives an instruction.
@@ -273,11 +299,13 @@ impl Executed {
     }
 }
 
-/// Judges a transition by what memory believes of its predicted effects, as a verifier would, and settles it.
+/// Judges a transition as a verifier would, by its report and by what memory believes of its predicted effects,
+/// and settles it.
 pub fn verify(memory: &mut dyn Memory, transition: TransitionId) -> Result<Outcome, MemoryError> {
     let view = memory.view();
     let known = view.transitions().iter().find(|known| known.id == transition);
-    let predicted = known.map(|known| known.predicted.clone()).ok_or(MemoryError::UnknownTransition(transition))?;
+    let known = known.ok_or(MemoryError::UnknownTransition(transition))?;
+    let (predicted, failed) = (known.predicted.clone(), known.report.failure.is_some());
     let judge = |literal: Literal| {
         let observed = view.belief(&literal);
         let outcome = match observed.truth {
@@ -289,7 +317,7 @@ pub fn verify(memory: &mut dyn Memory, transition: TransitionId) -> Result<Outco
     };
     let literals: Vec<LiteralVerdict> = predicted.into_iter().map(judge).collect();
     let any = |outcome| literals.iter().any(|literal| literal.outcome == outcome);
-    let outcome = if any(Outcome::Contradicted) {
+    let outcome = if failed || any(Outcome::Contradicted) {
         Outcome::Contradicted
     } else if any(Outcome::CannotTell) {
         Outcome::CannotTell

@@ -1,0 +1,263 @@
+//! The log: torn tails, damage, format, lock, wipes; the state is the fold of what was acknowledged.
+
+use super::*;
+use crate::{
+    MemoryError,
+    entry::Presence,
+    log::FORMAT,
+    memory::AcmMemory,
+    observation::Note,
+    staging::{Thing, begin, gripping_hand, look, open_hand, report, verify},
+};
+use acm_concept::{object::Visibility, skill::FailureCause, time::Time};
+use proptest::prelude::*;
+use std::{fs, path::Path};
+
+fn open(dir: &Path) -> Result<AcmMemory, MemoryError> {
+    AcmMemory::open(dir, Arc::clone(&LIBRARY))
+}
+
+/// One call on memory, chosen by a number.
+#[derive(Debug, Clone)]
+enum Step {
+    Look { x: f64, y: f64, length: f64, confidence: f64, gone: bool },
+    Pick { fails: bool },
+    Place { x: f64 },
+    Settle,
+    Note(u32),
+    Begin,
+    Wipe,
+}
+
+fn steps(count: usize) -> impl Strategy<Value = Vec<Step>> {
+    let look = (-0.3..0.3f64, -0.3..0.3f64, 0.03..0.1f64, 0.0..1.0f64, any::<bool>())
+        .prop_map(|(x, y, length, confidence, gone)| Step::Look { x, y, length, confidence, gone });
+    let step = prop_oneof![
+        6 => look,
+        2 => any::<bool>().prop_map(|fails| Step::Pick { fails }),
+        2 => (-0.3..0.3f64).prop_map(|x| Step::Place { x }),
+        2 => Just(Step::Settle),
+        1 => (0..4u32).prop_map(Step::Note),
+        1 => Just(Step::Begin),
+        1 => Just(Step::Wipe),
+    ];
+    prop::collection::vec(step, 1..count)
+}
+
+fn perform(memory: &mut AcmMemory, number: usize, step: &Step) -> Result<(), MemoryError> {
+    let seconds = number as f64;
+    let first = memory.view().objects().first().map(|entry| entry.id);
+    match step {
+        Step::Look { x, y, length, confidence, gone } => {
+            let things = [
+                Thing::block([*length, 0.03, 0.04]).at(*x, *y, 0.0).sure(*confidence),
+                Thing::mat(0.1, 0.1).at(0.1, 0.1, 0.0),
+            ];
+            let views: Vec<_> =
+                first.filter(|_| *gone).map(|id| (id, Visibility::SeenThrough, 0.9)).into_iter().collect();
+            let hand = if memory.view().held().is_some() { gripping_hand(seconds) } else { open_hand(seconds) };
+            look(memory, number as u64, seconds, &things, &views, &hand).map(drop)
+        }
+        Step::Pick { fails } => {
+            let Some(executed) = first.and_then(|id| report(&*memory.view(), "pick", id, seconds)) else {
+                return Ok(());
+            };
+            let executed = if *fails { executed.failing(FailureCause::Grasp, "slipped") } else { executed.holding() };
+            memory.record(&executed).map(drop)
+        }
+        Step::Place { x } => {
+            let view = memory.view();
+            let held = view.objects().iter().find(|entry| entry.presence == Presence::Held).map(|entry| entry.id);
+            let Some(executed) = held.and_then(|id| report(&*view, "place", id, seconds)) else { return Ok(()) };
+            let mut place = acm_concept::literal::Place { support: None, pose: Default::default(), tolerance_m: 0.03 };
+            place.pose.translation.x = *x;
+            memory.record(&executed.leaving(place)).map(drop)
+        }
+        Step::Settle => match memory.view().transitions().last().map(|transition| transition.id) {
+            Some(id) => verify(memory, id).map(drop),
+            None => Ok(()),
+        },
+        Step::Note(index) => memory.note(&Note::SubtaskDone { time: Time::from_seconds(seconds), index: *index }),
+        // One call: what `begin` does is two.
+        Step::Begin => memory.note(&Note::EpisodeBegan),
+        Step::Wipe => memory.wipe(),
+    }
+}
+
+/// The log's bytes after each acknowledged call, with the state then.
+fn states(dir: &Path, steps: &[Step]) -> Vec<(u64, crate::state::State)> {
+    let mut memory = open(dir).unwrap();
+    let log = dir.join("events.log");
+    let mut states = vec![(0, memory.state().clone())];
+    for (number, step) in steps.iter().enumerate() {
+        perform(&mut memory, number, step).unwrap();
+        if matches!(step, Step::Wipe) {
+            states.clear();
+        }
+        states.push((fs::metadata(&log).unwrap().len(), memory.state().clone()));
+    }
+    states
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+    #[test]
+    fn reopening_gives_the_same_state(steps in steps(24)) {
+        let dir = tempfile::tempdir().unwrap();
+        let states = states(dir.path(), &steps);
+        let reopened = open(dir.path()).unwrap();
+        prop_assert_eq!(reopened.state(), &states.last().unwrap().1);
+    }
+
+    #[test]
+    fn a_cut_anywhere_loses_only_what_was_not_acknowledged(steps in steps(16), place in any::<prop::sample::Index>()) {
+        let dir = tempfile::tempdir().unwrap();
+        let states = states(dir.path(), &steps);
+        check_cut(dir.path(), &states, place.index(states.last().unwrap().0 as usize + 1) as u64);
+    }
+}
+
+fn check_cut(dir: &Path, states: &[(u64, crate::state::State)], cut: u64) {
+    let log = dir.join("events.log");
+    let whole = fs::read(&log).unwrap();
+    fs::write(&log, &whole[..cut as usize]).unwrap();
+    let reopened = open(dir).unwrap();
+    // A wiped log begins with the wipe; cut before its end it is empty, as nothing is acknowledged in it.
+    let empty = (0, crate::state::State::default());
+    let (end, expected) = states.iter().rev().find(|(end, _)| *end <= cut).unwrap_or(&empty);
+    assert_eq!(reopened.state(), expected, "cut at {cut}");
+    assert_eq!(fs::metadata(&log).unwrap().len(), *end, "the torn tail is gone");
+    drop(reopened);
+    fs::write(&log, whole).unwrap();
+}
+
+#[test]
+fn a_cut_at_every_byte_of_the_last_batches_is_repaired() {
+    let dir = tempfile::tempdir().unwrap();
+    let look = |x, gone| Step::Look { x, y: 0.1, length: 0.05, confidence: 0.9, gone };
+    let steps = [
+        Step::Begin,
+        look(0.0, false),
+        look(0.0, false),
+        Step::Pick { fails: false },
+        Step::Place { x: 0.2 },
+        look(0.2, false),
+        Step::Settle,
+        Step::Note(0),
+    ];
+    let states = states(dir.path(), &steps);
+    let begin = states[states.len() - 4].0;
+    for cut in begin..=states.last().unwrap().0 {
+        check_cut(dir.path(), &states, cut);
+    }
+}
+
+#[test]
+fn writing_goes_on_after_a_repair() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut memory = open(dir.path()).unwrap();
+    begin(&mut memory).unwrap();
+    drop(memory);
+    let log = dir.path().join("events.log");
+    let mut bytes = fs::read(&log).unwrap();
+    bytes.extend([7u8; 100]);
+    fs::write(&log, bytes).unwrap();
+    let mut memory = open(dir.path()).unwrap();
+    look(&mut memory, 0, 0.0, &[Thing::can(0.03, 0.1)], &[], &open_hand(0.0)).unwrap();
+    let state = memory.state().clone();
+    drop(memory);
+    assert_eq!(open(dir.path()).unwrap().state(), &state);
+}
+
+#[test]
+fn damage_to_what_was_acknowledged_is_an_error_and_leaves_the_file_alone() {
+    let dir = tempfile::tempdir().unwrap();
+    let states = states(dir.path(), &[Step::Begin, Step::Note(0), Step::Note(1)]);
+    let log = dir.path().join("events.log");
+    let whole = fs::read(&log).unwrap();
+    for at in [3, 20, states[1].0 as usize + 12, states[2].0 as usize + 40] {
+        let mut damaged = whole.clone();
+        damaged[at] ^= 0x10;
+        fs::write(&log, &damaged).unwrap();
+        let error = open(dir.path()).unwrap_err();
+        assert!(matches!(error, MemoryError::Record { .. }), "{error}");
+        assert!(error.to_string().contains("damaged"), "{error}");
+        assert_eq!(fs::read(&log).unwrap(), damaged);
+    }
+}
+
+#[test]
+fn blocks_that_a_power_failure_kept_from_the_disk_are_a_torn_tail() {
+    let dir = tempfile::tempdir().unwrap();
+    let look = Step::Look { x: 0.0, y: 0.0, length: 0.05, confidence: 0.9, gone: false };
+    let states = states(dir.path(), &[Step::Begin, look]);
+    let log = dir.path().join("events.log");
+    let mut bytes = fs::read(&log).unwrap();
+    let begin = (states[1].0 as usize).next_multiple_of(512);
+    bytes[begin..begin + 512].fill(0);
+    fs::write(&log, bytes).unwrap();
+    assert_eq!(open(dir.path()).unwrap().state(), &states[1].1);
+}
+
+#[test]
+fn another_format_is_refused_with_both_numbers() {
+    let dir = tempfile::tempdir().unwrap();
+    drop(open(dir.path()).unwrap());
+    fs::write(dir.path().join("FORMAT"), "acm-memory 7\n").unwrap();
+    let error = open(dir.path()).unwrap_err();
+    assert!(matches!(error, MemoryError::Format { found: 7, known: FORMAT, .. }), "{error}");
+    fs::write(dir.path().join("FORMAT"), "something else").unwrap();
+    assert!(matches!(open(dir.path()).unwrap_err(), MemoryError::Record { .. }));
+}
+
+#[test]
+fn a_second_writer_is_refused_until_the_first_is_gone() {
+    let dir = tempfile::tempdir().unwrap();
+    let first = open(dir.path()).unwrap();
+    assert!(matches!(open(dir.path()).unwrap_err(), MemoryError::Locked { .. }));
+    drop(first);
+    assert!(open(dir.path()).is_ok());
+}
+
+#[test]
+fn what_was_wiped_is_in_no_file() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut memory = open(dir.path()).unwrap();
+    begin(&mut memory).unwrap();
+    look(&mut memory, 0, 0.0, &[Thing::can(0.03, 0.1)], &[], &open_hand(0.0)).unwrap();
+    assert!(contains(dir.path(), b"cylinder"));
+    memory.wipe().unwrap();
+    assert!(!contains(dir.path(), b"cylinder"));
+    look(&mut memory, 1, 1.0, &[Thing::block([0.05, 0.04, 0.03])], &[], &open_hand(1.0)).unwrap();
+    let state = memory.state().clone();
+    drop(memory);
+    let reopened = open(dir.path()).unwrap();
+    assert_eq!(reopened.state(), &state);
+    assert_eq!(reopened.view().objects().iter().map(|entry| entry.id.0).collect::<Vec<_>>(), [2]);
+}
+
+fn contains(dir: &Path, text: &[u8]) -> bool {
+    let files = fs::read_dir(dir).unwrap().map(|entry| fs::read(entry.unwrap().path()).unwrap());
+    files.into_iter().any(|bytes| bytes.windows(text.len()).any(|window| window == text))
+}
+
+#[test]
+fn a_report_that_cannot_be_read_back_is_refused_and_changes_nothing() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut memory = open(dir.path()).unwrap();
+    begin(&mut memory).unwrap();
+    look(&mut memory, 0, 0.0, &[Thing::can(0.03, 0.1)], &[], &open_hand(0.0)).unwrap();
+    let before = memory.state().clone();
+    let mut executed = report(&*memory.view(), "pick", ObjectId(1), 2.0).unwrap();
+    executed.report.measured.insert("grip_width_m".into(), f64::NAN);
+    assert!(matches!(memory.record(&executed), Err(MemoryError::Record { .. })));
+    assert_eq!(memory.state(), &before);
+    drop(memory);
+    assert_eq!(open(dir.path()).unwrap().state(), &before);
+}
+
+#[test]
+fn settling_what_was_never_recorded_is_an_error() {
+    let mut memory = memory();
+    assert!(matches!(verify(&mut memory, acm_concept::ids::TransitionId(3)), Err(MemoryError::UnknownTransition(_))));
+}
