@@ -8,8 +8,10 @@ use acm_concept::{embodiment::Feedback, primitive::Primitive as Kind, skill::Fai
 const PRESSING_M_S: f64 = 0.03;
 /// Upward force that tells that the fingers touch something, newtons.
 const TOUCH_N: f64 = 2.0;
-/// Below this the fingers are taken to be free; the last such height is where the touch began, newtons.
+/// Below this the fingers are taken to be free; the last such height is where the touch began, newtons. So many
+/// readings in a row are asked for, since a weak spring and noise together dip below it now and then.
 const FREE_N: f64 = 0.6;
+const FREE_READINGS: u32 = 3;
 /// Most force that is ever applied, newtons.
 const MOST_N: f64 = 25.0;
 /// How far beyond the stroke the hand may follow a cap that has no end, metres.
@@ -44,6 +46,7 @@ pub(crate) struct Push {
     phase: Phase,
     descent: Descent,
     lowest_seek_m: f64,
+    free_readings: u32,
     touch_height_m: f64,
     travel_m: f64,
     force_n: f64,
@@ -63,6 +66,7 @@ impl Push {
             phase: Phase::Seek,
             descent,
             lowest_seek_m,
+            free_readings: 0,
             touch_height_m: from_m,
             travel_m: 0.0,
             force_n: 0.0,
@@ -81,7 +85,8 @@ impl Primitive for Push {
     fn tick(&mut self, hand: &mut Hand, feedback: &Feedback) -> Step {
         let (force_n, height_m) = (hand.felt_n().z, feedback.tcp.translation.z);
         if self.phase == Phase::Seek {
-            if force_n < FREE_N {
+            self.free_readings = if force_n < FREE_N { self.free_readings + 1 } else { 0 };
+            if self.free_readings >= FREE_READINGS {
                 self.touch_height_m = height_m;
             }
             if force_n > TOUCH_N {
