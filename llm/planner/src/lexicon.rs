@@ -55,8 +55,6 @@ pub(crate) enum Slot {
     It,
     /// "its", "the", or a genitive.
     Its,
-    /// "its" or a genitive.
-    Genitive,
     /// A word for a place, or a noun.
     Spot,
 }

@@ -1,3 +1,116 @@
-//! References of a task grounded in memory.
+//! References of a task grounded in memory: phrases to objects and places, with the reasons kept.
 
 pub(crate) mod geometry;
+mod history;
+mod object;
+mod place;
+
+use crate::{
+    decision::{GiveUpCause, PlanOptions, Unknown},
+    explanation::ResolvedReference,
+    lexicon::Lexicon,
+    task::{ReferenceIndex, Task},
+};
+use acm_concept::{ids::ObjectId, pose::Pose, template::Template};
+use acm_memory::{
+    MemoryView,
+    entry::{Moment, ObjectEntry, Presence},
+};
+use std::cell::RefCell;
+
+pub(crate) use place::{like_places, surface_under};
+
+/// How far from a destination still counts as there, metres.
+pub(crate) const PLACE_TOLERANCE_M: f64 = 0.03;
+/// Descriptions within descriptions that are followed.
+const MAX_DEPTH: u32 = 6;
+
+/// Why a reference has no answer.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Stuck {
+    /// Whether another look may help.
+    pub look: bool,
+    /// What to say if it does not.
+    pub unknown: Unknown,
+}
+
+impl Stuck {
+    pub fn look(cause: GiveUpCause, text: String) -> Stuck {
+        Stuck { look: true, unknown: Unknown { cause, text } }
+    }
+    pub fn give_up(cause: GiveUpCause, text: String) -> Stuck {
+        Stuck { look: false, unknown: Unknown { cause, text } }
+    }
+}
+
+/// An answer with whether it was drawn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Meant<T> {
+    pub value: T,
+    pub guessed: bool,
+}
+
+/// Grounds the references of one task in one view; keeps what it found for the explanation.
+pub(crate) struct Grounder<'a> {
+    pub lexicon: &'a Lexicon,
+    pub task: &'a Task,
+    pub view: &'a dyn MemoryView,
+    pub options: &'a PlanOptions,
+    found: RefCell<Vec<ResolvedReference>>,
+}
+
+impl<'a> Grounder<'a> {
+    pub fn new(
+        lexicon: &'a Lexicon,
+        task: &'a Task,
+        view: &'a dyn MemoryView,
+        options: &'a PlanOptions,
+    ) -> Grounder<'a> {
+        Grounder { lexicon, task, view, options, found: RefCell::new(Vec::new()) }
+    }
+    /// What the phrases were taken to mean, each once, in the order of asking.
+    pub fn found(&self) -> Vec<ResolvedReference> {
+        self.found.borrow().clone()
+    }
+    pub(super) fn keep(&self, reference: ResolvedReference) {
+        let mut found = self.found.borrow_mut();
+        if !found.iter().any(|known| known.phrase == reference.phrase && known.recall == reference.recall) {
+            found.push(reference);
+        }
+    }
+    pub(super) fn phrase(&self, index: ReferenceIndex) -> &str {
+        self.task.references.get(index).map_or("it", |reference| reference.phrase.as_str())
+    }
+    /// When a subtask began; `None` for one that has not.
+    pub fn began(&self, subtask: u32) -> Option<Moment> {
+        let progress = self.view.progress();
+        match subtask.checked_sub(1) {
+            None => Some(progress.instructed),
+            Some(before) => progress.done.iter().find(|(index, _)| *index == before).map(|(_, moment)| *moment),
+        }
+    }
+    /// An object with its place known now, or why it has none.
+    pub(super) fn present(&self, id: ObjectId, phrase: &str) -> Result<(&'a ObjectEntry, Pose), Stuck> {
+        let entry = self.view.object(id);
+        match entry.and_then(|entry| Some((entry, entry.pose()?))) {
+            Some((entry, pose)) if entry.presence == Presence::Present => Ok((entry, pose)),
+            Some((entry, _)) if entry.presence == Presence::Held => {
+                Err(Stuck::give_up(GiveUpCause::Plan, format!("{phrase} ({id}) is in the hand and is nowhere")))
+            }
+            _ => Err(missing(id, phrase)),
+        }
+    }
+}
+
+/// The answer where an object's whereabouts are unknown.
+pub(crate) fn missing(id: ObjectId, phrase: &str) -> Stuck {
+    Stuck::look(GiveUpCause::Perception, format!("I do not know where {phrase} ({id}) is"))
+}
+
+/// Whether some part of an object has a function that declares this effect.
+pub(crate) fn has_effect(view: &dyn MemoryView, entry: &ObjectEntry, predicate: &str) -> bool {
+    let declares = |template: &Template| {
+        template.functions.iter().any(|f| f.effects.iter().any(|e| e.predicate == predicate && !e.negated))
+    };
+    entry.parts.iter().filter_map(|part| view.library().get(&part.template)).any(declares)
+}

@@ -51,7 +51,6 @@ pub(super) struct Captures {
 /// Reads phrases from the tokens of one instruction.
 pub(super) struct Reader<'a> {
     pub lexicon: &'a Lexicon,
-    pub library: &'a TemplateLibrary,
     pub tokens: &'a [Token],
     pub nouns: BTreeSet<&'a str>,
     spent: Cell<u32>,
@@ -61,7 +60,7 @@ pub(super) struct Reader<'a> {
 impl<'a> Reader<'a> {
     pub fn new(lexicon: &'a Lexicon, library: &'a TemplateLibrary, tokens: &'a [Token]) -> Reader<'a> {
         let nouns = library.iter().flat_map(|t| t.synopsis.nouns.iter().map(|noun| noun.noun.as_str())).collect();
-        Reader { lexicon, library, tokens, nouns, spent: Cell::new(0), failure: RefCell::new(None) }
+        Reader { lexicon, tokens, nouns, spent: Cell::new(0), failure: RefCell::new(None) }
     }
     /// Whether the budget is used up.
     pub fn exhausted(&self) -> bool {
@@ -185,17 +184,17 @@ impl<'a> Reader<'a> {
                 let phrases = self.noun_phrases(at, depth + 1).into_iter().filter(|(p, _)| p.located.is_none());
                 phrases.map(|(phrase, end)| with(&|c| c.it = Some(phrase.clone()), end)).collect()
             }
-            Slot::Its | Slot::Genitive => {
-                let owners = self.genitives(at, slot == Slot::Its, depth).into_iter();
+            Slot::Its => {
+                let owners = self.owners(at, depth).into_iter();
                 owners.map(|(owner, end)| with(&|c| c.it = owner.clone(), end)).collect()
             }
             Slot::Spot => self.spots(at).into_iter().map(|end| (captures.clone(), end)).collect(),
         }
     }
-    /// "its" or "the cube's"; with `article` also "the".
-    fn genitives(&self, at: usize, article: bool, depth: u32) -> Vec<(Option<NounPhrase>, usize)> {
+    /// "its", "the" or "the cube's".
+    fn owners(&self, at: usize, depth: u32) -> Vec<(Option<NounPhrase>, usize)> {
         let mut owners = Vec::new();
-        if self.is_word(at, "its") || (article && self.is_word(at, "the")) {
+        if self.is_word(at, "its") || self.is_word(at, "the") {
             owners.push((None, at + 1));
         }
         for (phrase, end) in self.noun_phrases(at, depth + 1) {

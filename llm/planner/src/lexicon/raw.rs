@@ -307,7 +307,6 @@ fn slot(name: &str) -> Option<Slot> {
         "times" => Slot::Times,
         "it" => Slot::It,
         "its" => Slot::Its,
-        "genitive" => Slot::Genitive,
         "spot" => Slot::Spot,
         _ => return None,
     })

@@ -1,0 +1,224 @@
+//! Which place a destination means.
+
+use super::{
+    Grounder, MAX_DEPTH, Meant, PLACE_TOLERANCE_M, Stuck,
+    geometry::{Extent, symmetry, top_centre},
+    has_effect,
+};
+use crate::{
+    decision::GiveUpCause,
+    task::{Destination, Direction, ReferenceIndex},
+};
+use acm_concept::{ids::ObjectId, literal::Place, pose::Pose, task::OnUnknown};
+use acm_memory::{
+    MemoryView,
+    entry::{ObjectEntry, Presence},
+};
+use glam::{DVec2, DVec3};
+use rand::Rng;
+
+/// Free space left between things that are put beside each other, metres.
+const BESIDE_GAP_M: f64 = 0.03;
+/// Colours within this delta E (CIE76) count as alike.
+const LIKE_COLOR: f64 = 30.0;
+/// Areas within this ratio count as alike.
+const LIKE_AREA: f64 = 2.0;
+/// Existence below which a remembered object does not count towards a group, 0-1.
+const MIN_CONFIDENCE: f64 = 0.3;
+
+impl Grounder<'_> {
+    /// Where `moved` shall stand for a destination, as the given subtask means it.
+    pub fn destination(
+        &self,
+        destination: &Destination,
+        moved: ObjectId,
+        subtask: u32,
+    ) -> Result<Meant<Place>, Stuck> {
+        match destination {
+            Destination::History { object, reference } => {
+                let of = self.object(*object)?;
+                let place = self.remembered(*object, of.value, *reference, subtask)?;
+                Ok(Meant { value: place.value, guessed: place.guessed || of.guessed })
+            }
+            other => self.spot(other, moved, 0),
+        }
+    }
+
+    /// Destinations that depend on the present alone.
+    pub(super) fn spot(&self, destination: &Destination, moved: ObjectId, depth: u32) -> Result<Meant<Place>, Stuck> {
+        if depth > MAX_DEPTH {
+            let text = "the destination is described by too many other things".to_owned();
+            return Err(Stuck::give_up(GiveUpCause::Plan, text));
+        }
+        match destination {
+            Destination::On { reference } => self.on(*reference, moved, depth),
+            Destination::Middle { of } => self.middle(*of, moved, depth),
+            Destination::Between { first, second } => {
+                let (a, b) = (self.object_at(*first, depth)?, self.object_at(*second, depth)?);
+                let (_, at) = self.present(a.value, self.phrase(*first))?;
+                let (_, other) = self.present(b.value, self.phrase(*second))?;
+                let spot = 0.5 * (at.translation + other.translation).truncate();
+                Ok(Meant { value: self.standing_at(spot, moved), guessed: a.guessed || b.guessed })
+            }
+            Destination::Beside { reference, side } => self.beside(*reference, *side, moved, depth),
+            Destination::History { .. } => {
+                let text = "a thing cannot be told apart by where it was once".to_owned();
+                Err(Stuck::give_up(GiveUpCause::Plan, text))
+            }
+        }
+    }
+
+    fn on(&self, reference: ReferenceIndex, moved: ObjectId, depth: u32) -> Result<Meant<Place>, Stuck> {
+        let under = self.object_at(reference, depth)?;
+        let phrase = self.phrase(reference);
+        if under.value == moved {
+            let text = format!("{phrase} is {moved} itself: nothing can stand on itself");
+            return Err(Stuck::give_up(GiveUpCause::Plan, text));
+        }
+        let (entry, _) = self.present(under.value, phrase)?;
+        let top = top_centre(self.view, entry)
+            .ok_or_else(|| Stuck::look(GiveUpCause::Perception, format!("I do not know the shape of {phrase}")))?;
+        let yaw = self.aligned_yaw(entry, moved);
+        let pose = Pose::from_yaw(top.translation, yaw);
+        let place = Place { support: Some(entry.id), pose, tolerance_m: PLACE_TOLERANCE_M };
+        Ok(Meant { value: place, guessed: under.guessed })
+    }
+
+    /// The heading of what carries it, turned by as little as its symmetry allows.
+    fn aligned_yaw(&self, carrier: &ObjectEntry, moved: ObjectId) -> f64 {
+        let Some((entry, pose)) = self.view.object(moved).and_then(|entry| Some((entry, entry.pose()?))) else {
+            return 0.0;
+        };
+        let carrier_yaw = carrier.pose().map_or(0.0, |pose| pose.yaw());
+        let along = symmetry(self.view, carrier).nearest(carrier_yaw, pose.yaw());
+        symmetry(self.view, entry).nearest(along, pose.yaw())
+    }
+
+    fn middle(&self, of: Option<ReferenceIndex>, moved: ObjectId, depth: u32) -> Result<Meant<Place>, Stuck> {
+        let (group, guessed) = match of {
+            Some(reference) => (self.group(reference, depth)?, false),
+            None => self.largest_group(moved)?,
+        };
+        let spots: Vec<DVec2> = group
+            .iter()
+            .filter(|entry| entry.id != moved)
+            .filter_map(|entry| Some(entry.pose()?.translation.truncate()))
+            .collect();
+        if spots.len() < 2 {
+            let what = of.map_or("like places", |reference| self.phrase(reference));
+            let text = format!("I do not know where the middle is: I see {} of {what}, and need two", spots.len());
+            return Err(Stuck::look(GiveUpCause::Perception, text));
+        }
+        let middle = spots.iter().sum::<DVec2>() / spots.len() as f64;
+        Ok(Meant { value: self.standing_at(middle, moved), guessed })
+    }
+
+    fn largest_group(&self, moved: ObjectId) -> Result<(Vec<&ObjectEntry>, bool), Stuck> {
+        let groups = like_places(self.view, moved);
+        let largest = groups.first().map_or(0, Vec::len);
+        let rivals: Vec<&Vec<&ObjectEntry>> = groups.iter().filter(|group| group.len() == largest).collect();
+        if rivals.len() <= 1 || largest < 2 {
+            return Ok((groups.into_iter().next().unwrap_or_default(), false));
+        }
+        if self.options.on_unknown == OnUnknown::Abstain {
+            let text = format!("which middle? {} groups of {largest} like places fit equally", rivals.len());
+            return Err(Stuck::give_up(GiveUpCause::Identity, text));
+        }
+        let chosen = self.draw(0, usize::MAX >> 1).random_range(0..rivals.len());
+        Ok((rivals.get(chosen).map(|group| (*group).clone()).unwrap_or_default(), true))
+    }
+
+    fn beside(
+        &self,
+        reference: ReferenceIndex,
+        side: Option<Direction>,
+        moved: ObjectId,
+        depth: u32,
+    ) -> Result<Meant<Place>, Stuck> {
+        let of = self.object_at(reference, depth)?;
+        let (entry, pose) = self.present(of.value, self.phrase(reference))?;
+        let radius = |entry: Option<&ObjectEntry>| {
+            entry.and_then(|entry| Extent::now(self.view, entry)).map_or(0.03, |extent| extent.radius())
+        };
+        let moved_entry = self.view.object(moved);
+        let distance = radius(Some(entry)) + radius(moved_entry) + BESIDE_GAP_M;
+        let spot = |side: Direction| pose.translation.truncate() + side.vector() * distance;
+        let others = |spot: DVec2| {
+            let far = |entry: &&ObjectEntry| {
+                entry.id != moved
+                    && entry.presence == Presence::Present
+                    && entry.pose().is_some_and(|p| p.translation.truncate().distance(spot) < distance * 0.9)
+            };
+            self.view.objects().iter().filter(far).count()
+        };
+        let sides = match side {
+            Some(side) => vec![side],
+            None => vec![Direction::Right, Direction::Left, Direction::Front, Direction::Back],
+        };
+        let best = sides.into_iter().map(spot).min_by_key(|spot| others(*spot)).unwrap_or_default();
+        Ok(Meant { value: self.standing_at(best, moved), guessed: of.guessed })
+    }
+
+    /// A spot seen from above as a place for `moved`, in its present heading.
+    fn standing_at(&self, spot: DVec2, moved: ObjectId) -> Place {
+        let pose = self.view.object(moved).and_then(ObjectEntry::pose).unwrap_or_default();
+        let (support, height) = surface_under(self.view, spot, moved);
+        let height = height.unwrap_or(pose.translation.z);
+        Place {
+            support,
+            pose: Pose::from_yaw(DVec3::new(spot.x, spot.y, height), pose.yaw()),
+            tolerance_m: PLACE_TOLERANCE_M,
+        }
+    }
+}
+
+/// What carries a spot: the highest thing that is made to carry and cannot be taken away, or else the support
+/// plane; with its height in the world, `None` if no plane is known.
+pub(crate) fn surface_under(view: &dyn MemoryView, spot: DVec2, moved: ObjectId) -> (Option<ObjectId>, Option<f64>) {
+    let mut best: Option<(ObjectId, f64)> = None;
+    for entry in view.objects().iter().filter(|entry| entry.id != moved && is_place(view, entry)) {
+        let Some(extent) = Extent::now(view, entry).filter(|extent| extent.covers(spot)) else { continue };
+        if best.is_none_or(|(_, high)| extent.high > high) {
+            best = Some((entry.id, extent.high));
+        }
+    }
+    match best {
+        Some((id, height)) => (Some(id), Some(height)),
+        None => (None, view.support().map(|plane| plane.height_at(spot.x, spot.y))),
+    }
+}
+
+/// Whether an object is a place: it carries things and is not itself to be picked up.
+fn is_place(view: &dyn MemoryView, entry: &ObjectEntry) -> bool {
+    entry.presence == Presence::Present
+        && entry.parts.iter().any(|part| part.affordances.iter().any(|affordance| affordance == "supportive"))
+        && !has_effect(view, entry, "holding")
+}
+
+/// Places that are alike (template, colour, area) in groups, the largest first.
+pub(crate) fn like_places<'v>(view: &'v dyn MemoryView, moved: ObjectId) -> Vec<Vec<&'v ObjectEntry>> {
+    let mut groups: Vec<Vec<&ObjectEntry>> = Vec::new();
+    let counts = |entry: &&ObjectEntry| entry.id != moved && entry.confidence >= MIN_CONFIDENCE;
+    for entry in view.objects().iter().filter(|entry| is_place(view, entry)).filter(counts) {
+        let (joined, mut rest): (Vec<_>, Vec<_>) =
+            groups.into_iter().partition(|group| group.iter().any(|member| alike(view, member, entry)));
+        let mut group: Vec<&ObjectEntry> = joined.into_iter().flatten().collect();
+        group.push(entry);
+        rest.push(group);
+        groups = rest;
+    }
+    for group in &mut groups {
+        group.sort_by_key(|entry| entry.id);
+    }
+    groups.sort_by_key(|group| (std::cmp::Reverse(group.len()), group.first().map(|entry| entry.id)));
+    groups
+}
+
+fn alike(view: &dyn MemoryView, a: &ObjectEntry, b: &ObjectEntry) -> bool {
+    let template = |entry: &ObjectEntry| entry.parts.first().map(|part| part.template.clone());
+    let area = |entry: &ObjectEntry| Extent::now(view, entry).map_or(0.0, |extent| extent.radius().powi(2));
+    let (small, large) = (area(a).min(area(b)), area(a).max(area(b)));
+    template(a) == template(b)
+        && a.appearance.mean.distance(&b.appearance.mean) < LIKE_COLOR
+        && large <= small * LIKE_AREA
+}

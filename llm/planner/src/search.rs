@@ -1,1 +1,0 @@
-//! Means-ends search over the skills that memory offers.
