@@ -12,6 +12,8 @@ mod first_frame;
 mod last_frame;
 mod method;
 mod reactive;
+#[cfg(test)]
+mod tests;
 
 pub use first_frame::FirstFrame;
 pub use method::{METHODS, MethodError, UnknownMethod, by_name};

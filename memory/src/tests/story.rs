@@ -5,7 +5,7 @@ use crate::MemoryView;
 use crate::{
     Snapshot,
     entry::{Presence, TransitionResult},
-    observation::{Note, Outcome},
+    observation::{Executed, Note, Outcome},
     query::{ObjectQuery, PlaceReference, Recall},
     staging::{Thing, gripping_hand, look, open_hand, report, verify},
 };
@@ -37,16 +37,17 @@ fn place_at(x: f64, y: f64) -> Place {
     Place { support: None, pose: Pose::from_translation(DVec3::new(x, y, 0.001)), tolerance_m: 0.03 }
 }
 
+/// The look after a skill: when it ended, the frame's number, where the block is seen.
+struct After(f64, u64, Option<(f64, f64)>);
+
 /// Runs one skill: predicted by the template, reported, looked at, judged.
 fn act(
     memory: &mut AcmMemory,
     skill: &str,
     on: ObjectId,
     to: Option<Place>,
-    at_s: f64,
-    frame: u64,
-    block_seen: Option<(f64, f64)>,
-    finish: impl FnOnce(crate::observation::Executed) -> crate::observation::Executed,
+    After(at_s, frame, block_seen): After,
+    finish: impl FnOnce(Executed) -> Executed,
 ) -> (TransitionId, Outcome) {
     let view = memory.snapshot();
     let candidates = view.skill_candidates(on, to);
@@ -68,13 +69,14 @@ fn bring_to_the_middle(memory: &mut AcmMemory, start: (f64, f64)) -> (ObjectId, 
     let view = memory.view();
     let (block, button) = (find(&*view, "block"), find(&*view, "button"));
     assert_eq!(truth(memory, &format!("moved({block})")), Truth::No);
-    let (_, outcome) = act(memory, "pick", block, None, 3.0, 2, None, |executed| executed.holding());
+    let (_, outcome) = act(memory, "pick", block, None, After(3.0, 2, None), |executed| executed.holding());
     assert_eq!(outcome, Outcome::Verified);
     assert_eq!(object(memory, block).presence, Presence::Held);
     assert_eq!(truth(memory, &format!("holding({block})")), Truth::Yes);
     let middle = place_at(0.1, -0.1);
-    let (_, outcome) =
-        act(memory, "place", block, Some(middle), 6.0, 3, Some((0.103, -0.098)), |executed| executed.leaving(middle));
+    let (_, outcome) = act(memory, "place", block, Some(middle), After(6.0, 3, Some((0.103, -0.098))), |executed| {
+        executed.leaving(middle)
+    });
     assert_eq!(outcome, Outcome::Verified);
     memory.note(&Note::SubtaskDone { time: Time::from_seconds(6.1), index: 0 }).unwrap();
     (block, button)
@@ -87,7 +89,7 @@ fn the_block_is_put_back_where_it_came_from() {
         let (block, button) = bring_to_the_middle(&mut memory, start);
         assert_eq!(truth(&memory, &format!("pressed({button})")), Truth::No);
         let pressed = Literal::parse(&format!("pressed({button})")).unwrap();
-        let (_, outcome) = act(&mut memory, "press", button, None, 9.0, 4, Some((0.102, -0.099)), |executed| {
+        let (_, outcome) = act(&mut memory, "press", button, None, After(9.0, 4, Some((0.102, -0.099))), |executed| {
             executed.feeling(pressed.clone())
         });
         assert_eq!(outcome, Outcome::Verified);
@@ -106,9 +108,10 @@ fn the_block_is_put_back_where_it_came_from() {
         let mat = value.support.expect("it stood on a mat");
         assert_eq!(object(&memory, mat).parts[0].template, "mat");
 
-        act(&mut memory, "pick", block, None, 12.0, 5, None, |executed| executed.holding());
-        let (last, outcome) =
-            act(&mut memory, "place", block, Some(value), 15.0, 6, Some(start), |executed| executed.leaving(value));
+        act(&mut memory, "pick", block, None, After(12.0, 5, None), |executed| executed.holding());
+        let (last, outcome) = act(&mut memory, "place", block, Some(value), After(15.0, 6, Some(start)), |executed| {
+            executed.leaving(value)
+        });
         assert_eq!(outcome, Outcome::Verified);
         assert_eq!(truth(&memory, &format!("on({block}, {mat})")), Truth::Yes);
         check_what_was_learned(&memory, block, last);
@@ -165,7 +168,7 @@ fn a_block_that_slipped_away_unseen_is_never_believed_to_be_held_or_placed() {
     look(&mut memory, 0, 0.1, &scene(Some(MATS[0])), &[], &open_hand(0.1)).unwrap();
     look(&mut memory, 1, 0.2, &scene(Some(MATS[0])), &[], &open_hand(0.2)).unwrap();
     let block = find(&*memory.view(), "block");
-    act(&mut memory, "pick", block, None, 3.0, 2, None, |executed| executed.holding());
+    act(&mut memory, "pick", block, None, After(3.0, 2, None), |executed| executed.holding());
     let middle = place_at(0.1, -0.1);
     let view = memory.snapshot();
     let candidate = view.skill_candidates(block, Some(middle)).into_iter().find(|c| c.skill == "place").unwrap();
@@ -202,7 +205,7 @@ fn fingers_that_feel_nothing_end_the_hold_even_if_no_report_says_so() {
     let mut memory = memory();
     look(&mut memory, 0, 0.1, &scene(Some(MATS[0])), &[], &open_hand(0.1)).unwrap();
     let block = find(&*memory.view(), "block");
-    act(&mut memory, "pick", block, None, 3.0, 1, None, |executed| executed.holding());
+    act(&mut memory, "pick", block, None, After(3.0, 1, None), |executed| executed.holding());
     // Not seen at its old place, and looked through there: it is in the hand.
     let views = [(block, Visibility::SeenThrough, 1.0)];
     let grounding = look(&mut memory, 2, 4.0, &scene(None), &views, &gripping_hand(4.0)).unwrap();
@@ -217,7 +220,7 @@ fn a_placed_block_is_not_believed_there_before_it_is_seen() {
     let mut memory = memory();
     look(&mut memory, 0, 0.1, &scene(Some(MATS[0])), &[], &open_hand(0.1)).unwrap();
     let block = find(&*memory.view(), "block");
-    act(&mut memory, "pick", block, None, 3.0, 1, None, |executed| executed.holding());
+    act(&mut memory, "pick", block, None, After(3.0, 1, None), |executed| executed.holding());
     let there = place_at(0.1, -0.1);
     let executed = report(&*memory.view(), "place", block, 6.0).unwrap().leaving(there);
     memory.record(&executed).unwrap();
