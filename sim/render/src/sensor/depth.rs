@@ -18,6 +18,8 @@ const FOCAL_WIDTHS: f32 = 384.0 / 640.0;
 /// How far an edge does harm varies along it, in steps of a pixel: standard normal noise exceeds the first value in
 /// two thirds of all places, the second in one third.
 const REACH_STEPS: [f32; 2] = [0.431, 0.967];
+/// Three halves of 2^23: next to it floats have steps of 1.
+const DROPS_FRACTIONS: f32 = 12_582_912.0;
 
 /// Adds the sensor's errors to the depth of a frame; metres, 0 where nothing is measured.
 pub(crate) fn measure(
@@ -36,22 +38,17 @@ pub(crate) fn measure(
     let mut noise = Noise::new(width, rng);
     let mut occlusion = Occlusion::default();
     let mut hidden = vec![false; width];
-    let mut in_image = vec![0f32; width];
+    let mut found = vec![0f32; width];
     let mut measured = vec![0f32; rendered.depth.len()];
     for (row, out) in measured.chunks_exact_mut(width).enumerate() {
         noise.next_row(errors, rng);
-        let line = &matcher.disparity[row * width..(row + 1) * width];
-        for (here, d) in in_image.iter_mut().zip(line) {
-            *here = d * matcher.image_scale;
-        }
-        occlusion.mark(&in_image, &mut hidden);
-        for (column, z) in out.iter_mut().enumerate() {
-            if hidden[column] || noise.is_hole(column) {
-                continue;
-            }
-            let shift = (noise.right[column], noise.down[column]);
-            let found = matcher.look(column, row, shift, noise.edge[column]);
-            *z = report.depth(found, noise.disparity[column]);
+        matcher.look_at_surfaces(row, &noise, &mut found);
+        matcher.look_at_edges(row, &noise, &mut found);
+        report.depths(&found, &noise.disparity, out);
+        occlusion.mark(matcher.line(row), matcher.image_scale, &mut hidden);
+        for ((z, hidden), dice) in out.iter_mut().zip(&hidden).zip(noise.dice.chunks_exact(2)) {
+            let lost = u32::from(u16::from_le_bytes([dice[0], dice[1]])) < noise.hole_limit;
+            *z = if *hidden || lost { 0.0 } else { *z };
         }
     }
     measured
@@ -67,10 +64,19 @@ struct Matcher<'a> {
     /// Pixels of the image to a pixel of the imagers.
     image_scale: f32,
     disparity: Vec<f32>,
+    columns: Vec<Column>,
     edges: Edges,
     reach: u8,
     /// Squared cosine of the largest angle at which a surface is measured.
     grazing: f32,
+}
+
+/// What the rays of a column have in common.
+struct Column {
+    /// Distance from the principal point, pixels.
+    u: f32,
+    /// Square of the ray's x where its z is 1.
+    ray_squared: f32,
 }
 
 impl<'a> Matcher<'a> {
@@ -80,59 +86,78 @@ impl<'a> Matcher<'a> {
         let focal_baseline = focal * BASELINE_M;
         let disparity: Vec<f32> =
             rendered.depth.iter().map(|&z| if z > 0.0 { focal_baseline / z } else { 0.0 }).collect();
+        let columns = (0..width).map(|column| {
+            let u = column as f32 - intrinsics.cx as f32;
+            Column { u, ray_squared: (u / intrinsics.fx as f32).powi(2) }
+        });
+        let columns = columns.collect();
         let edges = Edges::find(&disparity, width, errors.edge_reach_px);
         let image_scale = intrinsics.fx as f32 / focal;
         let grazing = errors.grazing_deg.to_radians().cos().powi(2);
         let reach = errors.edge_reach_px;
-        Matcher { intrinsics, width, height, focal_baseline, image_scale, disparity, edges, reach, grazing }
+        Matcher { intrinsics, width, height, focal_baseline, image_scale, disparity, columns, edges, reach, grazing }
     }
 
-    /// The disparity that the matcher finds for a pixel, without noise; 0 if it finds none. `shift` is where it
-    /// looks instead of at the pixel's centre, `edge` (standard normal) what an edge nearby does to it.
-    fn look(&self, column: usize, row: usize, shift: (f32, f32), edge: f32) -> f32 {
-        let index = row * self.width + column;
-        let distance = self.edges.distance[index];
-        if distance == 0 {
-            return self.look_at_surface(column, row, shift);
+    fn line(&self, row: usize) -> &[f32] {
+        &self.disparity[row * self.width..(row + 1) * self.width]
+    }
+
+    /// Writes the disparity that the matcher finds for each pixel of a row, without noise, as if the neighbours
+    /// belonged to the same surface; 0 where it finds none. Free of branches, so that the compiler takes several
+    /// pixels at a time: most pixels are of this kind.
+    fn look_at_surfaces(&self, row: usize, noise: &Noise, found: &mut [f32]) {
+        let i = self.intrinsics;
+        let (fx, fy, v) = (i.fx as f32, i.fy as f32, row as f32 - i.cy as f32);
+        let ray_down_squared = (v / fy).powi(2) + 1.0;
+        let (above, below) = (row.saturating_sub(1), (row + 1).min(self.height - 1));
+        let per_row = 1.0 / (below - above).max(1) as f32;
+        let vertical = self.line(above).iter().zip(self.line(below)).zip(&noise.down);
+        let horizontal = self.line(row).iter().zip(&self.columns).zip(&noise.right);
+        slopes(self.line(row), found);
+        for ((out, ((d, column), right)), ((above, below), down)) in found.iter_mut().zip(horizontal).zip(vertical) {
+            let (slope_right, slope_down) = (*out, (below - above) * per_row);
+            // Inverse depth, and so disparity, is linear over the image of a plane: its gradient gives the normal.
+            let forward = d - column.u * slope_right - v * slope_down;
+            let normal_squared = (fx * slope_right).powi(2) + (fy * slope_down).powi(2) + forward * forward;
+            let ray_squared = column.ray_squared + ray_down_squared;
+            let steep = d * d < self.grazing * normal_squared * ray_squared;
+            *out = if steep { 0.0 } else { d + slope_right * right + slope_down * down };
         }
+    }
+
+    /// Replaces what was found where an edge is near: there the pixel sees one of two surfaces, or nothing.
+    fn look_at_edges(&self, row: usize, noise: &Noise, found: &mut [f32]) {
         let at =
             |place: usize, shift: f32, size: usize| place.saturating_add_signed(shift.round() as isize).min(size - 1);
-        let seen = self.disparity[at(row, shift.1, self.height) * self.width + at(column, shift.0, self.width)];
-        let steps = REACH_STEPS.iter().filter(|&&step| edge.abs() > step).count() as u8;
-        if distance > self.reach.saturating_sub(2) + steps {
-            return seen;
-        }
-        let foreground = self.edges.foreground[index];
-        if edge < 0.0 {
-            0.0
-        } else if foreground > seen + JUMP_PX {
-            foreground
-        } else {
-            seen
+        let start = row * self.width;
+        let marks = self.edges.distance[start..start + self.width].iter().zip(&self.edges.foreground[start..]);
+        for (column, ((distance, &foreground), out)) in marks.zip(found).enumerate() {
+            if *distance == 0 {
+                continue;
+            }
+            let (x, y) = (at(column, noise.right[column], self.width), at(row, noise.down[column], self.height));
+            let seen = self.disparity[y * self.width + x];
+            let edge = noise.edge[column];
+            let steps = REACH_STEPS.iter().filter(|&&step| edge.abs() > step).count() as u8;
+            let harmed = *distance <= self.reach.saturating_sub(2) + steps;
+            *out = match harmed {
+                true if edge < 0.0 => 0.0,
+                true if foreground > seen + JUMP_PX => foreground,
+                _ => seen,
+            };
         }
     }
+}
 
-    /// As `look`, where the neighbours belong to the same surface.
-    fn look_at_surface(&self, column: usize, row: usize, shift: (f32, f32)) -> f32 {
-        let index = row * self.width + column;
-        let d = self.disparity[index];
-        let slope = |place: usize, size: usize, step: usize| {
-            let (before, after) = (usize::from(place > 0), usize::from(place + 1 < size));
-            let rise = self.disparity[index + after * step] - self.disparity[index - before * step];
-            rise / (before + after).max(1) as f32
-        };
-        let (right, down) = (slope(column, self.width, 1), slope(row, self.height, self.width));
-        // Inverse depth, and so disparity, is linear over the image of a plane: its gradient gives the normal.
-        let i = self.intrinsics;
-        let (fx, fy) = (i.fx as f32, i.fy as f32);
-        let (u, v) = (column as f32 - i.cx as f32, row as f32 - i.cy as f32);
-        let forward = d - u * right - v * down;
-        let normal_squared = (fx * right).powi(2) + (fy * down).powi(2) + forward.powi(2);
-        let ray_squared = (u / fx).powi(2) + (v / fy).powi(2) + 1.0;
-        if d * d < self.grazing * normal_squared * ray_squared {
-            return 0.0;
+/// Change of the values from one to the next; one-sided at both ends.
+fn slopes(line: &[f32], out: &mut [f32]) {
+    let last = line.len() - 1;
+    out[0] = line[last.min(1)] - line[0];
+    out[last] = line[last] - line[last.saturating_sub(1)];
+    if last >= 2 {
+        for ((out, before), after) in out[1..last].iter_mut().zip(&line[..last - 1]).zip(&line[2..]) {
+            *out = 0.5 * (after - before);
         }
-        d + right * shift.0 + down * shift.1
     }
 }
 
@@ -155,17 +180,15 @@ impl Report {
         }
     }
 
-    fn depth(&self, disparity: f32, noise: f32) -> f32 {
-        if disparity <= 0.0 {
-            return 0.0;
+    /// Depths of a row from the disparities found and their errors; 0 where nothing is found or out of range.
+    fn depths(&self, found: &[f32], noise: &[f32], out: &mut [f32]) {
+        for ((z, found), noise) in out.iter_mut().zip(found).zip(noise) {
+            // Adding a number so large that fractions drop out rounds to the nearest, much faster than `round`.
+            let steps = ((found + noise) * self.steps_per_px + DROPS_FRACTIONS) - DROPS_FRACTIONS;
+            let depth = self.depth_of_step / steps;
+            let valid = *found > 0.0 && steps > 0.0 && depth >= self.min && depth <= self.max;
+            *z = if valid { depth } else { 0.0 };
         }
-        // Rounds by cutting off, which is much faster than `round`; what is negative becomes 0.
-        let steps = ((disparity + noise) * self.steps_per_px + 0.5) as u32;
-        if steps == 0 {
-            return 0.0;
-        }
-        let z = self.depth_of_step / steps as f32;
-        if z >= self.min && z <= self.max { z } else { 0.0 }
     }
 }
 
@@ -199,9 +222,5 @@ impl Noise {
         edge.next_row(1.0, rng, &mut self.edge);
         rng.fill_bytes(&mut self.dice);
         self.hole_limit = (errors.hole_share * 65_536.0) as u32;
-    }
-
-    fn is_hole(&self, column: usize) -> bool {
-        u32::from(u16::from_le_bytes([self.dice[2 * column], self.dice[2 * column + 1]])) < self.hole_limit
     }
 }

@@ -3,6 +3,9 @@
 /// How much larger a disparity must be to hide another one, pixels. Neighbours on one slanted surface, which land on
 /// the same pixel of the second imager, differ by less.
 const MARGIN_PX: f32 = 1.0;
+/// If disparity nowhere rises faster than this from a pixel to the next, two pixels that land within two pixels of
+/// each other are at most two apart, differ by less than the margin, and nothing is hidden.
+const HARMLESS_RISE_PX: f32 = 0.3;
 
 /// Finds what the second imager, to the right of the first, does not see. Keeps its buffer between rows.
 #[derive(Default)]
@@ -11,25 +14,32 @@ pub(crate) struct Occlusion {
 }
 
 impl Occlusion {
-    /// Marks the occluded pixels of one row. `disparity` is in pixels of this very image, 0 where there is nothing.
+    /// Marks the occluded pixels of one row. `disparity`, times `scale`, is in pixels of this very image; 0 where
+    /// there is nothing.
     ///
     /// Every pixel moves left by its disparity into the second image, where the largest disparity wins; whoever
     /// finds a larger one in its place is hidden.
-    pub(crate) fn mark(&mut self, disparity: &[f32], hidden: &mut [bool]) {
+    pub(crate) fn mark(&mut self, disparity: &[f32], scale: f32, hidden: &mut [bool]) {
+        hidden.fill(false);
+        let rise = disparity.windows(2).map(|pair| pair[1] - pair[0]).fold(0f32, |most, rise| most.max(rise));
+        if rise * scale <= HARMLESS_RISE_PX {
+            return;
+        }
         let width = disparity.len();
         self.nearest.clear();
         self.nearest.resize(2 * width + 2, 0.0);
         for (column, &d) in disparity.iter().enumerate() {
-            let Some(at) = place(column, d, width) else { continue };
+            let Some(at) = place(column, d * scale, width) else { continue };
             // A pixel lands between two; taking both closes the gaps of surfaces that the second imager sees wider.
             if let Some(slots) = self.nearest.get_mut(at..at + 2) {
                 slots[0] = slots[0].max(d);
                 slots[1] = slots[1].max(d);
             }
         }
+        let margin = MARGIN_PX / scale;
         for (column, (&d, hidden)) in disparity.iter().zip(hidden).enumerate() {
-            let front = place(column, d, width).and_then(|at| self.nearest.get(at));
-            *hidden = front.is_some_and(|&front| front > d + MARGIN_PX);
+            let front = place(column, d * scale, width).and_then(|at| self.nearest.get(at));
+            *hidden = front.is_some_and(|&front| front > d + margin);
         }
     }
 }
@@ -47,7 +57,7 @@ mod tests {
 
     fn hidden(disparity: &[f32]) -> Vec<usize> {
         let mut marks = vec![false; disparity.len()];
-        Occlusion::default().mark(disparity, &mut marks);
+        Occlusion::default().mark(disparity, 1.0, &mut marks);
         (0..disparity.len()).filter(|&column| marks[column]).collect()
     }
 
