@@ -41,7 +41,9 @@ pub(crate) fn decide(
     let Some(subtask) = task.subtasks.get(current as usize) else {
         return Decision::Done { reason: format!("all {} subtasks are done", task.subtasks.len()) };
     };
-    let mind = Mind { ground: Grounder::new(lexicon, task, view, options), view, situation, options, current };
+    let may_look = situation.looks < MAX_LOOKS;
+    let mind =
+        Mind { ground: Grounder::new(lexicon, task, view, options, may_look), view, situation, options, current };
     mind.decide(task, subtask).unwrap_or_else(|stuck| mind.look_or_give_up(stuck))
 }
 

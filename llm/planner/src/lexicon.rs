@@ -148,6 +148,8 @@ pub struct Lexicon {
     pub(crate) ordinals: Vec<(u32, Form)>,
     pub(crate) times: Vec<(u32, Form)>,
     pub(crate) colors: Vec<(ColorTerm, Vec<Form>)>,
+    /// Changes of lightness by "dark" and its like.
+    pub(crate) shades: Vec<(f64, Vec<Form>)>,
     pub(crate) aliases: BTreeMap<String, String>,
     pub(crate) plurals: BTreeMap<String, String>,
     pub(crate) frames: Vec<Frame>,

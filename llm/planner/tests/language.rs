@@ -4,6 +4,7 @@
 use acm_concept::template::TemplateLibrary;
 use acm_planner::{ParseError, Planner, Task};
 use proptest::prelude::*;
+use std::sync::OnceLock;
 
 const CANONICAL: &str = "Bring the cube to the middle, press the button, then return it to where it came from.";
 
@@ -18,7 +19,9 @@ fn library() -> TemplateLibrary {
 }
 
 fn parse(text: &str) -> Result<Task, ParseError> {
-    Planner::new().unwrap().parse(text, &library())
+    static MIND: OnceLock<(Planner, TemplateLibrary)> = OnceLock::new();
+    let (planner, library) = MIND.get_or_init(|| (Planner::new().unwrap(), library()));
+    planner.parse(text, library)
 }
 
 fn outline(text: &str) -> Vec<String> {
@@ -48,4 +51,148 @@ fn a_task_names_its_nouns_and_its_words() {
     assert_eq!(task.nouns, ["cube", "button"]);
     let texts: Vec<&str> = task.subtasks.iter().map(|subtask| subtask.text.as_str()).collect();
     assert_eq!(texts, ["Bring the cube to the middle", "press the button", "return it to where it came from"]);
+}
+
+#[test]
+fn an_unknown_noun_is_named_with_its_span() {
+    let text = "Bring the coffee machine to the middle.";
+    let error = parse(text).unwrap_err();
+    assert!(
+        matches!(&error, ParseError::UnknownNoun { text, known, .. } if text == "coffee machine" && known.contains("cube"))
+    );
+    assert_eq!(error.span().unwrap().of(text), "coffee machine");
+    assert!(parse("Bring the cbue to the middle.").unwrap_err().to_string().contains("did you mean `cube`"));
+    let text = "Put the red cube on the banana, then press the button.";
+    assert_eq!(parse(text).unwrap_err().span().unwrap().of(text), "banana");
+}
+
+#[test]
+fn what_cannot_be_read_is_named_and_never_skipped() {
+    for (text, span) in [
+        ("Juggle the cube.", "Juggle"),
+        ("Press the button until the light goes on.", "until"),
+        ("Bring the cube to the middle, press the button, then sing.", "sing"),
+        ("Put the cube somewhere.", "somewhere"),
+    ] {
+        let error = parse(text).unwrap_err();
+        assert_eq!(error.span().unwrap().of(text), span, "{text}: {error}");
+    }
+}
+
+#[test]
+fn what_is_read_but_cannot_be_done_says_why() {
+    for (text, span, why) in [
+        ("Press the cube.", "the cube", "function press"),
+        ("Pick up the mat.", "the mat", "picked up"),
+        ("Put the cube on the button.", "the button", "carry"),
+        ("Put all the cubes on the left mat.", "all the cubes", "one by one"),
+        ("Move the cube to the middle of the table.", "to the middle of the table", "how far it reaches"),
+    ] {
+        let error = parse(text).unwrap_err();
+        assert!(matches!(error, ParseError::Unsupported { .. }), "{text}: {error}");
+        assert_eq!(error.span().unwrap().of(text), span, "{text}");
+        assert!(error.to_string().contains(why), "{error}");
+    }
+    assert!(matches!(parse("Put it on the left mat."), Err(ParseError::NoAntecedent { .. })));
+    assert!(matches!(parse("Move the other cube to the middle."), Err(ParseError::NoAntecedent { .. })));
+    assert_eq!(parse(" ,. "), Err(ParseError::Empty));
+}
+
+#[test]
+fn pronouns_stand_for_what_the_verb_can_act_on() {
+    let outline = outline("Put the red cube on the left mat, press the button, then pick it up and press it again.");
+    assert_eq!(outline, ["at(#0, on #1)", "press(#2) x1", "holding(#0)", "press(#2) x1"]);
+}
+
+#[test]
+fn the_order_of_doing_follows_after_and_before() {
+    let put_back = ["at(#0, middle)", "press(#1) x1", "at(#0, BeforeMoved of #0)"];
+    for text in [
+        "Bring the cube to the middle; return it to where it came from after pressing the button.",
+        "Before you return the cube to where it came from, bring it to the middle and press the button.",
+        "Press the button after bringing the cube to the middle, then put it back.",
+        "After bringing the cube to the middle and pressing the button, return it to where it came from.",
+        "Bring the cube to the middle. Press the button. After pressing the button, return the cube to its mat.",
+    ] {
+        let lines = outline(text);
+        assert_eq!(lines.len(), 3, "{text}: {lines:?}");
+        let kinds: Vec<&str> = lines.iter().map(|line| line.split('(').next().unwrap()).collect();
+        assert_eq!(kinds, ["at", "press", "at"], "{text}");
+        assert!(lines[0].contains("middle") && lines[2].contains("BeforeMoved"), "{text}: {lines:?}");
+    }
+    assert_eq!(outline(CANONICAL), put_back);
+}
+
+#[test]
+fn times_ordinals_and_negation_are_read() {
+    assert_eq!(outline("Press the second button from the left twice, then the right button once.").len(), 2);
+    assert_eq!(outline("Hit the button 3 times."), ["press(#0) x3"]);
+    assert_eq!(outline("Give the button two pushes."), ["press(#0) x2"]);
+    let task = parse("Put the red cube on the blue mat without touching the green cube.").unwrap();
+    assert_eq!(task.untouched.len(), 1);
+    assert_eq!(task.subtasks.len(), 1);
+}
+
+#[test]
+fn nouns_and_colours_may_change_one_for_one() {
+    let shape = outline(CANONICAL);
+    for (noun, color, place) in [
+        ("can", "green ", "pads"),
+        ("box", "", "mats"),
+        ("cylinder", "dark blue ", "mats"),
+        ("disc", "purple ", "markers"),
+    ] {
+        let text = format!(
+            "Bring the {color}{noun} to the middle of the {place}, press the switch, then return it to where it came from."
+        );
+        match parse(&text) {
+            Ok(task) => assert_eq!(task.outline(), shape, "{text}"),
+            Err(error) => panic!("{text}: {error}"),
+        }
+    }
+}
+
+#[test]
+fn a_task_survives_being_sent_as_a_message() {
+    let task = parse("Put the dark red cube on the second mat from the left, then bring it back.").unwrap();
+    let text = serde_json::to_string(&task).unwrap();
+    assert_eq!(serde_json::from_str::<Task>(&text).unwrap(), task);
+}
+
+/// Words that the lexicon knows, so that the generated sentences get deep into the grammar.
+const WORDS: [&str; 34] = [
+    "bring", "put", "press", "return", "the", "a", "red", "left", "second", "cube", "mats", "button", "it", "its",
+    "to", "on", "in", "of", "middle", "between", "and", "then", "where", "came", "from", "was", "back", "once",
+    "after", ",", "before", "cube's", "place", "that is",
+];
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(200))]
+
+    #[test]
+    fn reading_never_panics_on_arbitrary_text(text in "\\PC{0,300}") {
+        if let Err(error) = parse(&text) {
+            prop_assert!(!error.to_string().is_empty());
+            let span = error.span();
+            prop_assert!(span.is_none_or(|span| text.get(span.start..span.end).is_some()), "{error:?}");
+        }
+    }
+
+    #[test]
+    fn reading_never_panics_on_known_words_in_any_order(words in prop::collection::vec(0..WORDS.len(), 0..40)) {
+        let text = words.iter().map(|&word| WORDS[word]).collect::<Vec<_>>().join(" ");
+        if let Ok(task) = parse(&text) {
+            let known = |index: usize| index < task.references.len();
+            prop_assert!(task.subtasks.iter().all(|subtask| known(subtask.goal.object())));
+            prop_assert!(task.subtasks.len() <= acm_planner::language::MAX_CLAUSES);
+        }
+    }
+}
+
+#[test]
+fn very_long_and_very_ambiguous_texts_are_refused() {
+    assert!(matches!(parse(&"press the button ".repeat(1000)), Err(ParseError::TooLong { .. })));
+    assert!(matches!(parse(&"press the button, ".repeat(40)), Err(ParseError::TooLong { .. })));
+    let nested = format!("put the cube {} in the middle", "on the mat between the cube and the cube ".repeat(20));
+    assert!(parse(&nested).is_err());
 }

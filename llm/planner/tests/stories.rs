@@ -280,11 +280,12 @@ fn a_stack_is_taken_apart_before_the_lower_cube_is_picked() {
     let (lower, at) = (ObjectId(4), world.spot(ObjectId(4)));
     let upper = world.cube(at, GREEN, Some(lower));
     let mut first = None;
-    let end = run(&mut world, &task(PUT_BACK.replace("the cube", "the red cube").as_str()), &abstain(), |_, decision| {
-        if let (Decision::Act { step, explanation }, None) = (decision, &first) {
-            first = Some((step.candidate.part.object, explanation.clone()));
-        }
-    });
+    let end =
+        run(&mut world, &task(PUT_BACK.replace("the cube", "the red cube").as_str()), &abstain(), |_, decision| {
+            if let (Decision::Act { step, explanation }, None) = (decision, &first) {
+                first = Some((step.candidate.part.object, explanation.clone()));
+            }
+        });
     assert!(matches!(end, Decision::Done { .. }), "{end:?}");
     let (object, explanation) = first.unwrap();
     assert_eq!(object, upper);
@@ -373,4 +374,19 @@ fn binding_gives_the_controller_perceived_geometry() {
     assert!((last.support_height_m - (world::TABLE_Z + 0.001)).abs() < 1e-9, "the mat's top");
     assert!((press.frame.translation.z - (world::TABLE_Z + 0.02)).abs() < 1e-9);
     assert!(press.obstacles.iter().any(|(id, _)| *id == ObjectId(4)), "the cube in the middle is an obstacle");
+}
+
+#[test]
+fn an_unconfirmed_rival_is_looked_at_and_then_left_out() {
+    let mut world = World::with_mats(3, 0);
+    let ghost = world.cube(DVec2::new(-0.1, 0.2), RED, None);
+    world.objects.last_mut().unwrap().verified = false;
+    let mut looks = 0;
+    let end = run(&mut world, &task("Pick up the cube."), &abstain(), |_, decision| {
+        looks += u32::from(matches!(decision, Decision::Look { .. }));
+    });
+    assert!(matches!(end, Decision::Done { .. }), "{end:?}");
+    assert_eq!(world.held().unwrap().id, ObjectId(4));
+    assert_ne!(ghost, ObjectId(4));
+    assert!(looks >= 3, "{looks}");
 }

@@ -14,7 +14,7 @@ use acm_concept::{
 };
 use acm_memory::{
     MemoryView,
-    entry::{HistoryEntry, Moment, ObjectEntry, PlaceCause},
+    entry::{HistoryEntry, Moment, ObjectEntry, PlaceCause, Transition},
     query::{PlaceReference, Recall},
 };
 use glam::DVec2;
@@ -62,7 +62,8 @@ impl Grounder<'_> {
         let recall = self.view.recall_place(object, reference);
         let own = self.view.object(object).and_then(|entry| first_own_move(self.view, entry));
         let instructed = self.view.progress().instructed;
-        let transition = own.and_then(|id| self.view.transitions().iter().find(|t| t.id == id && t.moment >= instructed));
+        let transition =
+            own.and_then(|id| self.view.transitions().iter().find(|t| t.id == id && t.moment >= instructed));
         let made_for = transition.and_then(|transition| transition.subtask);
         match recall {
             Recall::Known { .. } if reference == PlaceReference::BeforeMoved && made_for == Some(subtask) => {
@@ -90,6 +91,9 @@ impl Grounder<'_> {
                 return Err(self.unknown_past(index, object, reference, reason));
             }
             Recall::Unknown { reason, candidates } => {
+                if let Some(place) = self.drawn_before(object, subtask) {
+                    return Ok(Meant { value: place, guessed: true });
+                }
                 let candidates = self.candidates(object, candidates, subtask);
                 let fraction: f64 = self.draw(subtask, index).random();
                 match choose(&candidates, fraction) {
@@ -108,6 +112,14 @@ impl Grounder<'_> {
             guessed,
         });
         Ok(Meant { value: place, guessed })
+    }
+
+    /// Where an earlier step of the subtask brought the object: a guess is not drawn anew because the guess itself
+    /// changed what is free.
+    fn drawn_before(&self, object: ObjectId, subtask: u32) -> Option<Place> {
+        let since = self.began(subtask)?;
+        let of_subtask = |t: &&Transition| t.subtask == Some(subtask) && t.object() == object && t.moment >= since;
+        self.view.transitions().iter().rev().filter(of_subtask).find_map(|t| t.report.invocation.destination)
     }
 
     /// The sentence for a past that memory does not hold.

@@ -56,6 +56,8 @@ pub(crate) struct Grounder<'a> {
     pub task: &'a Task,
     pub view: &'a dyn MemoryView,
     pub options: &'a PlanOptions,
+    /// Whether another look may still be taken.
+    pub may_look: bool,
     found: RefCell<Vec<ResolvedReference>>,
 }
 
@@ -65,8 +67,9 @@ impl<'a> Grounder<'a> {
         task: &'a Task,
         view: &'a dyn MemoryView,
         options: &'a PlanOptions,
+        may_look: bool,
     ) -> Grounder<'a> {
-        Grounder { lexicon, task, view, options, found: RefCell::new(Vec::new()) }
+        Grounder { lexicon, task, view, options, may_look, found: RefCell::new(Vec::new()) }
     }
     /// What the phrases were taken to mean, each once, in the order of asking.
     pub fn found(&self) -> Vec<ResolvedReference> {
@@ -80,6 +83,19 @@ impl<'a> Grounder<'a> {
     }
     pub(super) fn phrase(&self, index: ReferenceIndex) -> &str {
         self.task.references.get(index).map_or("it", |reference| reference.phrase.as_str())
+    }
+    /// Where some of several things are confirmed and others are not: looks as long as looks are left, then goes
+    /// by those that are. A plan may rest on what is unconfirmed only where nothing better exists.
+    pub(super) fn confirmed<'e>(&self, entries: Vec<&'e ObjectEntry>) -> Result<Vec<&'e ObjectEntry>, Stuck> {
+        let (confirmed, others): (Vec<_>, Vec<_>) = entries.iter().copied().partition(|entry| entry.verified);
+        match (confirmed.is_empty(), others.first()) {
+            (false, Some(other)) if self.may_look => {
+                let text = format!("{} {} is not confirmed by a second view yet", other.category, other.id);
+                Err(Stuck::look(GiveUpCause::Perception, text))
+            }
+            (false, Some(_)) => Ok(confirmed),
+            _ => Ok(entries),
+        }
     }
     /// When a subtask began; `None` for one that has not.
     pub fn began(&self, subtask: u32) -> Option<Moment> {

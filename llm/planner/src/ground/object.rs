@@ -36,7 +36,10 @@ impl<'a> Grounder<'a> {
 
     pub(super) fn object_at(&self, index: ReferenceIndex, depth: u32) -> Result<Meant<ObjectId>, Stuck> {
         let reference = self.reference(index)?;
-        let (retrieval, contenders) = self.contenders(index, reference, depth)?;
+        let (retrieval, mut contenders) = self.contenders(index, reference, depth)?;
+        if reference.quantity == Quantity::TheOne {
+            contenders = self.confirmed(contenders)?;
+        }
         let (chosen, how, guessed) = match contenders.as_slice() {
             [] => return Err(self.none_fits(reference, &retrieval)),
             [only] => (only.id, format!("{}: nothing else fits", only.id), false),
@@ -71,7 +74,8 @@ impl<'a> Grounder<'a> {
     pub(super) fn group(&self, index: ReferenceIndex, depth: u32) -> Result<Vec<&'a ObjectEntry>, Stuck> {
         let reference = self.reference(index)?;
         let (retrieval, contenders) = self.contenders(index, reference, depth)?;
-        let present: Vec<_> = contenders.into_iter().filter(|entry| entry.presence == Presence::Present).collect();
+        let present = contenders.into_iter().filter(|entry| entry.presence == Presence::Present).collect();
+        let present = self.confirmed(present)?;
         let names = present.iter().map(|entry| entry.id.to_string()).collect::<Vec<_>>().join(", ");
         self.keep(ResolvedReference {
             phrase: reference.phrase.clone(),
@@ -117,8 +121,7 @@ impl<'a> Grounder<'a> {
         });
         let best = retrieval.hits.iter().map(|hit| hit.score).fold(0.0, f64::max);
         let in_contention = retrieval.hits.iter().filter(|hit| hit.score >= CONTENTION * best);
-        let mut contenders: Vec<&ObjectEntry> =
-            in_contention.filter_map(|hit| self.view.object(hit.object)).collect();
+        let mut contenders: Vec<&ObjectEntry> = in_contention.filter_map(|hit| self.view.object(hit.object)).collect();
         contenders.sort_by_key(|entry| entry.id);
 
         let began = self.began(reference.subtask);
@@ -140,12 +143,7 @@ impl<'a> Grounder<'a> {
     }
 
     /// What "the other one" and "do not touch" rule out.
-    fn excluded(
-        &self,
-        index: ReferenceIndex,
-        reference: &ObjectReference,
-        depth: u32,
-    ) -> Result<Vec<ObjectId>, Stuck> {
+    fn excluded(&self, index: ReferenceIndex, reference: &ObjectReference, depth: u32) -> Result<Vec<ObjectId>, Stuck> {
         let mut excluded = Vec::new();
         for &other in &reference.other_than {
             excluded.push(self.object_at(other, depth + 1)?.value);
@@ -222,9 +220,8 @@ impl<'a> Grounder<'a> {
     /// Any one: the one already worked on, or else the first that is there.
     fn any_one(&self, reference: &ObjectReference, several: &[&ObjectEntry]) -> ObjectId {
         let worked_on = |entry: &&&ObjectEntry| {
-            let own = |t: &acm_memory::entry::Transition| {
-                t.subtask == Some(reference.subtask) && t.object() == entry.id
-            };
+            let own =
+                |t: &acm_memory::entry::Transition| t.subtask == Some(reference.subtask) && t.object() == entry.id;
             entry.presence == Presence::Held || self.view.transitions().iter().any(own)
         };
         let present = |entry: &&&ObjectEntry| entry.presence == Presence::Present;
@@ -261,9 +258,8 @@ fn known_at(entry: &ObjectEntry, began: Option<Moment>) -> bool {
 }
 
 fn keep_rank(contenders: &mut Vec<&ObjectEntry>, rank: Rank, began: Option<Moment>) {
-    let spot = |entry: &ObjectEntry| {
-        place_at(entry, began).map_or(DVec2::ZERO, |(pose, _)| pose.translation.truncate())
-    };
+    let spot =
+        |entry: &ObjectEntry| place_at(entry, began).map_or(DVec2::ZERO, |(pose, _)| pose.translation.truncate());
     let key = |entry: &ObjectEntry, middle: DVec2| match rank {
         Rank::FromSide(_, side) => -spot(entry).dot(Direction::vector(side)),
         Rank::Middle => spot(entry).distance(middle),

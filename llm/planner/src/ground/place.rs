@@ -28,12 +28,7 @@ const MIN_CONFIDENCE: f64 = 0.3;
 
 impl Grounder<'_> {
     /// Where `moved` shall stand for a destination, as the given subtask means it.
-    pub fn destination(
-        &self,
-        destination: &Destination,
-        moved: ObjectId,
-        subtask: u32,
-    ) -> Result<Meant<Place>, Stuck> {
+    pub fn destination(&self, destination: &Destination, moved: ObjectId, subtask: u32) -> Result<Meant<Place>, Stuck> {
         match destination {
             Destination::History { object, reference } => {
                 let of = self.object(*object)?;
@@ -118,7 +113,7 @@ impl Grounder<'_> {
         let largest = groups.first().map_or(0, Vec::len);
         let rivals: Vec<&Vec<&ObjectEntry>> = groups.iter().filter(|group| group.len() == largest).collect();
         if rivals.len() <= 1 || largest < 2 {
-            return Ok((groups.into_iter().next().unwrap_or_default(), false));
+            return Ok((self.confirmed(groups.into_iter().next().unwrap_or_default())?, false));
         }
         if self.options.on_unknown == OnUnknown::Abstain {
             let text = format!("which middle? {} groups of {largest} like places fit equally", rivals.len());
@@ -196,7 +191,7 @@ fn is_place(view: &dyn MemoryView, entry: &ObjectEntry) -> bool {
 }
 
 /// Places that are alike (template, colour, area) in groups, the largest first.
-pub(crate) fn like_places<'v>(view: &'v dyn MemoryView, moved: ObjectId) -> Vec<Vec<&'v ObjectEntry>> {
+pub(crate) fn like_places(view: &dyn MemoryView, moved: ObjectId) -> Vec<Vec<&ObjectEntry>> {
     let mut groups: Vec<Vec<&ObjectEntry>> = Vec::new();
     let counts = |entry: &&ObjectEntry| entry.id != moved && entry.confidence >= MIN_CONFIDENCE;
     for entry in view.objects().iter().filter(|entry| is_place(view, entry)).filter(counts) {

@@ -49,9 +49,9 @@ pub(super) enum Order {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Statement {
     /// To be done. A background clause ("after pressing the button") adds nothing if it was said before.
-    Do { clause: Clause, order: Order, background: bool },
+    Do { clause: Box<Clause>, order: Order, background: bool },
     /// Not to be touched.
-    Leave { object: NounPhrase },
+    Leave { object: Box<NounPhrase> },
 }
 
 impl Reader<'_> {
@@ -69,17 +69,17 @@ impl Reader<'_> {
             } else if let Some(start) = self.longest(at, &words.before_markers) {
                 let (clause, end) = self.clause(start, None, true)?;
                 main_comes_before = true;
-                (Statement::Do { clause, order: Order::Last, background: true }, end)
+                (Statement::Do { clause: Box::new(clause), order: Order::Last, background: true }, end)
             } else if let Some(start) = self.longest(at, &words.after_markers) {
                 let (clause, end) = self.clause(start, None, true)?;
                 let trails = self.skip_links(end) >= self.tokens.len();
                 let order = if trails && !statements.is_empty() { Order::BeforeLast } else { Order::Last };
-                (Statement::Do { clause, order, background: true }, end)
+                (Statement::Do { clause: Box::new(clause), order, background: true }, end)
             } else {
                 let (clause, end) = self.clause(at, last_frame, false)?;
                 last_frame = Some(clause.frame);
                 let order = if main_comes_before { Order::BeforeLast } else { Order::Last };
-                (Statement::Do { clause, order, background: false }, end)
+                (Statement::Do { clause: Box::new(clause), order, background: false }, end)
             };
             statements.push(statement);
             let (trailing, end) = self.trailing(end);
@@ -96,7 +96,7 @@ impl Reader<'_> {
         for (markers, order) in [(&words.before_markers, Order::Last), (&words.after_markers, Order::BeforeLast)] {
             let Some(start) = self.longest(at, markers) else { continue };
             if let Some((clause, end)) = self.clause(start, None, true) {
-                return (Some(Statement::Do { clause, order, background: true }), end);
+                return (Some(Statement::Do { clause: Box::new(clause), order, background: true }), end);
             }
         }
         (None, at)
@@ -131,7 +131,7 @@ impl Reader<'_> {
         if found.is_none() {
             self.fail(start, Expected::Other("only a thing that shall not be touched"));
         }
-        found.map(|(object, end)| (Statement::Leave { object }, end))
+        found.map(|(object, end)| (Statement::Leave { object: Box::new(object) }, end))
     }
 
     /// The longest reading of a clause; on equal length the one that needs fewer places to tell things apart, then

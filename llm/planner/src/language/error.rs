@@ -26,7 +26,7 @@ pub enum ParseError {
         text: String,
         /// Where they stand.
         span: Span,
-        /// Nouns of the library.
+        /// Nouns of the library, with a suggestion where one is spelt nearly so.
         known: String,
     },
     /// Words that fit no rule.

@@ -7,9 +7,7 @@ use super::{
 };
 use crate::{
     lexicon::FrameGoal,
-    task::{
-        Destination, Goal, ObjectReference, Quantity, ReferenceIndex, Span, Subtask, Task, functions_with_effect,
-    },
+    task::{Destination, Goal, ObjectReference, Quantity, ReferenceIndex, Span, Subtask, Task, functions_with_effect},
 };
 use acm_concept::template::TemplateLibrary;
 
@@ -30,11 +28,7 @@ enum Role {
 }
 
 /// Joins statements to a task.
-pub(super) fn interpret(
-    library: &TemplateLibrary,
-    text: &str,
-    statements: &[Statement],
-) -> Result<Task, ParseError> {
+pub(super) fn interpret(library: &TemplateLibrary, text: &str, statements: &[Statement]) -> Result<Task, ParseError> {
     let mut reading = Interpretation { library, text, references: Vec::new(), subtasks: Vec::new() };
     let mut untouched = Vec::new();
     for statement in statements {
@@ -69,10 +63,9 @@ impl Interpretation<'_> {
     fn add(&mut self, clause: &Clause, order: Order, background: bool) -> Result<(), ParseError> {
         let goal = self.goal(clause)?;
         let same_but_times = |known: &Goal| match (known, &goal) {
-            (
-                Goal::Performed { function: a, object: x, .. },
-                Goal::Performed { function: b, object: y, .. },
-            ) => a == b && x == y && clause.times.is_none(),
+            (Goal::Performed { function: a, object: x, .. }, Goal::Performed { function: b, object: y, .. }) => {
+                a == b && x == y && clause.times.is_none()
+            }
             (known, goal) => known == goal,
         };
         if background && self.subtasks.iter().any(|subtask| same_but_times(&subtask.goal)) {
@@ -117,11 +110,7 @@ impl Interpretation<'_> {
     }
 
     /// The meaning of a place; `moved` is what goes there, whose past "where it came from" means.
-    fn destination(
-        &mut self,
-        place: &PlacePhrase,
-        moved: Option<ReferenceIndex>,
-    ) -> Result<Destination, ParseError> {
+    fn destination(&mut self, place: &PlacePhrase, moved: Option<ReferenceIndex>) -> Result<Destination, ParseError> {
         Ok(match &place.kind {
             PlaceKind::On(phrase) => {
                 let reference = self.reference(phrase, &Role::Affordance(SUPPORTIVE))?;
@@ -163,7 +152,9 @@ impl Interpretation<'_> {
             return self.antecedent(phrase.span, role);
         }
         if phrase.quantified {
-            return Err(self.unsupported(phrase.span, "goals over several things are not understood; name them one by one"));
+            return Err(
+                self.unsupported(phrase.span, "goals over several things are not understood; name them one by one")
+            );
         }
         self.check_role(phrase, role)?;
         if let Some(known) = self.named_before(phrase, role)? {

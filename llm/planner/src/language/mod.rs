@@ -73,7 +73,12 @@ fn report(reader: &Reader<'_>, text: &str) -> ParseError {
     }
     match failure.expected {
         Expected::Noun => {
-            let known = reader.nouns.iter().copied().collect::<Vec<_>>().join(", ");
+            let mut known = reader.nouns.iter().copied().collect::<Vec<_>>().join(", ");
+            let lower = words.to_lowercase();
+            let near = reader.nouns.iter().map(|noun| (strsim::damerau_levenshtein(&lower, noun), noun)).min();
+            if let Some((_, noun)) = near.filter(|(distance, _)| *distance <= 1 + lower.chars().count() / 4) {
+                known.push_str(&format!("; did you mean `{noun}`?"));
+            }
             ParseError::UnknownNoun { text: words, span, known }
         }
         Expected::Verb => {

@@ -161,7 +161,7 @@ impl Reader<'_> {
     /// Reads one adjective at `at` into the phrase and gives its end.
     fn adjective(&self, phrase: &mut NounPhrase, at: usize) -> Option<usize> {
         let words = &self.lexicon.words;
-        let at = if self.is_stop(at) && phrase.color.is_some() | phrase.size.is_some() { at + 1 } else { at };
+        let at = if self.is_stop(at) && (phrase.color.is_some() || phrase.size.is_some()) { at + 1 } else { at };
         if let Some(end) = self.longest(at, &words.same) {
             return Some(end);
         }
@@ -209,11 +209,14 @@ impl Reader<'_> {
     }
 
     fn color(&self, at: usize) -> Option<(ColorTerm, usize)> {
+        let (lightness, at) = self.meaning(at, &self.lexicon.shades).unwrap_or((0.0, at));
         let readings = self.lexicon.colors.iter().filter_map(|(term, forms)| Some((term, self.longest(at, forms)?)));
         let (term, end) = readings.max_by_key(|(_, end)| *end)?;
+        let mut term = term.clone();
+        term.lab.l = (term.lab.l + lightness).clamp(0.0, 100.0);
         // "blue-coloured" and the like.
-        let suffix = ["colored", "coloured", "one"].iter().take(2).any(|word| self.is_word(end, word));
-        Some((term.clone(), if suffix { end + 1 } else { end }))
+        let suffix = ["colored", "coloured"].iter().any(|word| self.is_word(end, word));
+        Some((term, if suffix { end + 1 } else { end }))
     }
 
     /// The noun at `at`, the longest first, as the library calls it.

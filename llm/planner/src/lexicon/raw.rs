@@ -66,6 +66,14 @@ struct RawAlias {
 #[serde(deny_unknown_fields)]
 struct RawColors {
     color: Vec<RawColor>,
+    shade: Vec<RawShade>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawShade {
+    words: Vec<String>,
+    lightness: f64,
 }
 
 #[derive(Deserialize)]
@@ -138,6 +146,7 @@ pub(super) fn parse(files: &BTreeMap<String, String>) -> Result<Lexicon, Lexicon
         times: numbers(&words.times)?,
         words: closed_classes(&words)?,
         colors: colors.color.iter().map(color).collect::<Result<_, _>>()?,
+        shades: colors.shade.iter().map(|s| Ok((s.lightness, phrases(&s.words)?))).collect::<Result<_, _>>()?,
         aliases: nouns.alias.iter().flat_map(|a| a.words.iter().map(|w| (w.clone(), a.noun.clone()))).collect(),
         plurals: nouns.plurals,
         verbs: verb_forms(&verbs),
@@ -347,11 +356,19 @@ fn known_words(lexicon: &Lexicon) -> BTreeSet<String> {
     let beside = lexicon.beside.iter().flat_map(|(_, forms)| forms);
     let sizes = lexicon.sizes.iter().flat_map(|(_, forms)| forms);
     let colors = lexicon.colors.iter().flat_map(|(_, forms)| forms);
+    let shades = lexicon.shades.iter().flat_map(|(_, forms)| forms);
     let numbers = lexicon.ordinals.iter().chain(&lexicon.times).map(|(_, form)| form);
     let history = lexicon.history.iter().map(|history| &history.form);
     let frames = lexicon.frames.iter().flat_map(|frame| frame.forms.iter().map(|form| &form.form));
-    let forms =
-        classes.chain(directions).chain(beside).chain(sizes).chain(colors).chain(numbers).chain(history).chain(frames);
+    let forms = classes
+        .chain(directions)
+        .chain(beside)
+        .chain(sizes)
+        .chain(colors)
+        .chain(shades)
+        .chain(numbers)
+        .chain(history)
+        .chain(frames);
     let mut known: BTreeSet<String> = lexicon.verbs.keys().cloned().collect();
     for element in forms.flatten() {
         if let Element::Words { any, .. } = element {

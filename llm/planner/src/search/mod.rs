@@ -71,14 +71,17 @@ pub(crate) struct Found {
 enum Condition {
     Literal(Literal),
     /// Nothing stands where the object shall stand.
-    Free { place: Place, object: ObjectId },
+    Free {
+        place: Place,
+        object: ObjectId,
+    },
 }
 
 #[derive(Clone)]
 enum Item {
     Achieve(Condition),
     Perform { function: String, object: ObjectId },
-    Apply { candidate: SkillCandidate, purpose: Option<Condition>, repairs: u32 },
+    Apply { candidate: Box<SkillCandidate>, purpose: Option<Condition>, repairs: u32 },
 }
 
 /// A partial plan: what is done so far, and what is open, the next on top.
@@ -101,7 +104,14 @@ pub(crate) fn search(view: &dyn MemoryView, wants: &[Want], limits: &Limits) -> 
         },
         _ => None,
     });
-    let mut search = Search { view, limits, reserved: reserved.collect(), open: BinaryHeap::new(), found: Found::default(), order: 0 };
+    let mut search = Search {
+        view,
+        limits,
+        reserved: reserved.collect(),
+        open: BinaryHeap::new(),
+        found: Found::default(),
+        order: 0,
+    };
     let agenda = wants.iter().rev().map(|want| match want {
         Want::Holds(literal) => Item::Achieve(Condition::Literal(literal.clone())),
         Want::Perform { function, object } => Item::Perform { function: function.clone(), object: *object },
@@ -175,7 +185,7 @@ impl<'v> Search<'v, '_> {
                     let missing = self.conditions(&candidate).into_iter();
                     let missing: Vec<Condition> = missing.filter(|c| self.truth(&node, c) != Truth::Yes).collect();
                     if missing.is_empty() {
-                        self.apply(&mut node, candidate);
+                        self.apply(&mut node, *candidate);
                         continue;
                     }
                     if repairs >= MAX_REPAIRS {
@@ -299,7 +309,7 @@ impl<'v> Search<'v, '_> {
         }
         let mut next = node.clone();
         let conditions = self.conditions(&candidate);
-        next.agenda.push(Item::Apply { candidate, purpose, repairs: 0 });
+        next.agenda.push(Item::Apply { candidate: Box::new(candidate), purpose, repairs: 0 });
         next.agenda.extend(conditions.into_iter().rev().map(Item::Achieve));
         self.push(next);
     }

@@ -144,9 +144,7 @@ impl<'v> State<'v> {
                 return false;
             }
             let extent = self.standing(entry).and_then(|pose| Extent::at(self.view, entry, &pose));
-            extent.is_some_and(|extent| {
-                extent.gap(&wanted) < -TOUCH_M && extent.shared_height(&wanted) > TOUCH_M
-            })
+            extent.is_some_and(|extent| extent.gap(&wanted) < -TOUCH_M && extent.shared_height(&wanted) > TOUCH_M)
         };
         self.view.objects().iter().filter(hinders).map(|entry| entry.id).collect()
     }
@@ -168,11 +166,12 @@ impl<'v> State<'v> {
         let low = spots.iter().fold(start, |a, b| a.min(*b)) - MARGIN_M;
         let high = spots.iter().fold(start, |a, b| a.max(*b)) + MARGIN_M;
         let taken = |keep_off_flat: bool| -> Vec<Extent> {
-            let things = standing.iter().filter(|(other, _)| keep_off_flat || has_effect(self.view, other, "holding") || !carries(other));
+            let things = standing
+                .iter()
+                .filter(|(other, _)| keep_off_flat || has_effect(self.view, other, "holding") || !carries(other));
             let extents = things.filter_map(|(other, pose)| Extent::at(self.view, other, pose));
-            let reserved = reserved.iter().filter_map(|(id, place)| {
-                Extent::at(self.view, self.view.object(*id)?, &place.pose)
-            });
+            let reserved =
+                reserved.iter().filter_map(|(id, place)| Extent::at(self.view, self.view.object(*id)?, &place.pose));
             extents.chain(reserved).collect()
         };
         let yaw = entry.pose().map_or(0.0, |pose| pose.yaw());

@@ -17,8 +17,7 @@ use acm_concept::{
 use acm_memory::{
     MemoryView,
     entry::{
-        HistoryEntry, Moment, ObjectEntry, PlaceCause, Presence, SkillEntry, TaskProgress, Transition,
-        TransitionResult,
+        HistoryEntry, Moment, ObjectEntry, PlaceCause, Presence, SkillEntry, TaskProgress, Transition, TransitionResult,
     },
     query::{Hit, ObjectQuery, PlaceReference, Prediction, Recall, Retrieval, SkillCandidate},
 };
@@ -192,12 +191,8 @@ impl World {
         let now = moment(self.now);
         for entry in &mut self.objects {
             let place = entry.place();
-            entry.history = vec![HistoryEntry {
-                moment: now,
-                place,
-                cause: PlaceCause::Seen(FrameId(99)),
-                verified: true,
-            }];
+            entry.history =
+                vec![HistoryEntry { moment: now, place, cause: PlaceCause::Seen(FrameId(99)), verified: true }];
         }
     }
     /// A look: what was lost is seen where it lies.
@@ -375,10 +370,9 @@ impl MemoryView for World {
         let first_gone = history.iter().position(|h| h.place.is_none());
         match first_gone.and_then(|at| history[..at].last()).and_then(|h| h.place) {
             Some(value) => Recall::Known { value, confidence: 0.9, evidence: vec![Evidence::Frame(FrameId(0))] },
-            None => Recall::Unknown {
-                reason: "no move of it was seen or made".into(),
-                candidates: self.candidates.clone(),
-            },
+            None => {
+                Recall::Unknown { reason: "no move of it was seen or made".into(), candidates: self.candidates.clone() }
+            }
         }
     }
     fn belief(&self, literal: &Literal) -> Belief {
