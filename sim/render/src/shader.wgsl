@@ -119,8 +119,8 @@ fn shade(in: Surface, base: vec3<f32>) -> Pixel {
     var light = frame.misc.x + frame.sun.w * max(dot(normal, frame.sun.xyz), 0.0) * sunlit(in.position, normal);
     for (var k = 0u; k < u32(frame.misc.y); k += 1u) {
         let towards = frame.points[k].xyz - in.position;
-        let squared = max(dot(towards, towards), 1e-4);
-        light += frame.points[k].w * max(dot(normal, towards), 0.0) / (squared * sqrt(squared));
+        let nearness = inverseSqrt(max(dot(towards, towards), 1e-4));
+        light += frame.points[k].w * max(dot(normal, towards), 0.0) * nearness * nearness * nearness;
     }
     let color = base * light;
     var out: Pixel;
