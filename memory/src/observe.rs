@@ -5,6 +5,7 @@ use crate::{
     entry::{Moment, ObjectEntry, PlaceCause, Presence},
     event::{Change, Glance, Pending},
     fusion,
+    geometry::Body,
     hand::HandFeeling,
     identity::{self, IdentityRule, MAX_PERCEPTS, Match, Percept, predict},
     observation::{Grounding, Observation, Resolved},
@@ -31,6 +32,10 @@ pub(crate) const MOVED_M: f64 = 0.02;
 const STRONG_ABSENCE: f64 = 0.5;
 /// A share that is enough on its own.
 const CERTAIN_ABSENCE: f64 = 0.8;
+/// Lower things are flat: they are seen by their colour, metres.
+const FLAT_M: f64 = 0.005;
+/// Colours nearer than this in the a-b plane are the same.
+const SAME_COLOR: f64 = 15.0;
 /// Matches above this probability may verify an object.
 const SURE_MATCH: f64 = 0.6;
 
@@ -217,20 +222,23 @@ impl Frame<'_, '_, '_> {
         Some(Resolved { percept: percept.index, object: id, new: true, probability, accepted: true })
     }
 
-    /// Whether a newcomer lies inside something that this frame shows as well: two solids cannot share a place,
-    /// so it is a piece of that.
+    /// Whether a newcomer lies inside something that this frame shows as well: two solids cannot share a place, so
+    /// it is a piece of that. Flat things share theirs with all that stands on them; there the colour decides.
     fn is_fragment(&self, percept: &Percept<'_>, matches: &[Match]) -> bool {
         let body = &percept.body;
-        let matched = |index: usize| matches.iter().any(|m| m.percept == index && m.object.is_some());
-        self.percepts.iter().enumerate().any(|(index, other)| {
-            let shared = body.top_m.min(other.body.top_m) - body.base_m.max(other.body.base_m);
-            other.index != percept.index
-                && matched(index)
-                && other.body.area() > body.area()
-                && other.body.covers(body.centre, 0.0)
+        let shown = |found: &&Match| self.percepts.get(found.percept).is_some_and(|p| p.index != percept.index);
+        let whole = matches.iter().filter(shown).filter_map(|found| found.object);
+        whole.filter_map(|id| self.stage.entry(&self.draft.state, id)).any(|entry| {
+            let Some(other) = Body::of(&entry.parts, self.draft.library) else { return false };
+            let shared = body.top_m.min(other.top_m) - body.base_m.max(other.base_m);
+            let same_solid = if other.height() < FLAT_M {
+                let color = entry.appearance.mean.chroma_distance(&percept.object.appearance.mean);
+                body.height() < FLAT_M && color < SAME_COLOR && shared > -scene::REST_TOLERANCE_M
+            } else {
                 // Flat things under a block sink into it by the camera's error.
-                && body.height() > 0.005
-                && shared > 0.5 * body.height()
+                body.height() > FLAT_M && shared > 0.5 * body.height()
+            };
+            same_solid && other.area() > body.area() && other.covers(body.centre, 0.0)
         })
     }
 
@@ -314,7 +322,7 @@ fn judge(
 fn is_in_place(entry: &ObjectEntry, percept: &Percept<'_>, library: &acm_concept::template::TemplateLibrary) -> bool {
     let Some(known) = entry.parts.first().map(|part| &part.pose) else { return false };
     let offset = percept.pose.pose.translation - known.pose.translation;
-    let slack = crate::geometry::Body::of(&entry.parts, library).map_or(0.0, |body| {
+    let slack = Body::of(&entry.parts, library).map_or(0.0, |body| {
         let (seen, known) = (percept.body.extents(), body.extents());
         0.5 * (known[0] - seen[0]).max(known[1] - seen[1]).max(0.0)
     });

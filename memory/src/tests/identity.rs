@@ -208,3 +208,18 @@ fn a_fragment_of_a_thing_that_is_seen_whole_is_no_thing_of_its_own() {
     assert_eq!(grounding.resolved.len(), 1);
     assert_eq!(memory.view().objects().len(), 1);
 }
+
+#[test]
+fn the_halves_of_a_mat_on_both_sides_of_an_arm_are_one_mat_and_a_small_mat_on_it_is_another() {
+    let mut memory = memory();
+    let mat = |length: f64, x: f64| Thing::mat(length, 0.1).at(x, 0.0, 0.0).colored([90, 160, 90]);
+    look(&mut memory, 0, 0.0, &[mat(0.2, 0.0)], &[], &open_hand(0.0)).unwrap();
+    let halves = [mat(0.1, -0.05).cut(), mat(0.1, 0.08).at(0.08, 0.0, 0.008).cut()];
+    let grounding = look(&mut memory, 1, 1.0, &halves, &[], &open_hand(1.0)).unwrap();
+    assert_eq!(grounding.resolved.iter().map(|found| found.object).collect::<Vec<_>>(), [ObjectId(1)]);
+    let label = Thing::mat(0.05, 0.05).at(0.02, 0.0, 0.001).colored(RED);
+    let grounding =
+        look(&mut memory, 2, 2.0, &[mat(0.2, 0.0), label, block(0.05, 0.02)], &[], &open_hand(2.0)).unwrap();
+    assert_eq!(grounding.resolved.iter().filter(|found| found.new).count(), 2);
+    assert_eq!(object(&memory, ObjectId(2)).support, Some(ObjectId(1)));
+}
