@@ -5,8 +5,8 @@ mod minimise;
 mod model;
 mod profile;
 
-pub(crate) use evidence::{Evidence, OutlineKind, OutlinePoint};
-pub(crate) use minimise::{Minimum, cost, minimise, rough_cost};
+pub(crate) use evidence::{Evidence, OutlineKind, OutlinePoint, SurfacePoint};
+pub(crate) use minimise::{Minimum, approach, cost, minimise, rough_cost};
 pub(crate) use model::{Base, Model, corners};
 pub(crate) use profile::observability;
 

@@ -8,6 +8,7 @@ use crate::{
     expected::{self, Remembered},
     fit::{Base, Evidence},
     hypotheses::{self, Context, Measured},
+    joins,
     own, patches,
     scan::Scan,
     scene::Scene,
@@ -104,13 +105,11 @@ impl Grounder {
     fn objects(&self, scene: &Scene, expectation: &Expectation, remembered: &Remembered) -> Vec<GroundedObject> {
         let mut segments = segments::split(scene);
         expected::split(scene, remembered, &mut segments);
+        let unremembered =
+            Context { library: &self.library, config: &self.config, nouns: &expectation.nouns, remembered: None };
+        joins::join(scene, &mut segments, unremembered);
         let standing: Vec<bool> = segments.labels.iter().map(|label| *label != NONE).collect();
-        let context = |remembered| Context {
-            library: &self.library,
-            config: &self.config,
-            nouns: &expectation.nouns,
-            remembered,
-        };
+        let context = |remembered| Context { remembered, ..unremembered };
         let (mut objects, mut bodies) = (Vec::new(), Bodies::default());
         for patch in patches::find(scene, &standing) {
             let measured = Measured { plan: patch.plan, height_m: 0.0, base: Base::At(0.0), seen_by: SeenBy::Color };
@@ -125,9 +124,10 @@ impl Grounder {
         let mut pieces: Vec<(f64, Vec<usize>, Evidence)> = segments
             .pixels()
             .into_iter()
+            .filter(|pixels| !pixels.is_empty())
             .map(|pixels| {
                 let evidence = Evidence::of_segment(scene, &segments, &pixels);
-                (bases::lowest_m(scene, &pixels), pixels, evidence)
+                (scene.lowest_m(&pixels), pixels, evidence)
             })
             .collect();
         // From below, so that what stands on another thing finds it.
@@ -138,7 +138,7 @@ impl Grounder {
             let bottom = match base {
                 Base::At(height) | Base::Free(height) => height,
             };
-            let height_m = bases::top_m(&evidence) - bottom;
+            let height_m = evidence.top_m() - bottom;
             let measured = Measured { plan, height_m, base, seen_by: SeenBy::Depth };
             let context = context(remembered.template_at(&pixels));
             let ranked = hypotheses::rank(context, &measured, &evidence);

@@ -3,7 +3,7 @@
 
 use crate::{
     config::GrounderConfig,
-    fit::{Base, Evidence, Minimum, Model, cost, minimise, rough_cost},
+    fit::{Base, Evidence, Minimum, OutlineKind, Model, approach, cost, minimise, rough_cost},
     measure::{self, Rectangle},
 };
 use acm_concept::template::{SeenBy, Template, TemplateLibrary};
@@ -91,12 +91,15 @@ fn best_fit<'a>(
     let mut starts: Vec<_> = rectangles.iter().filter_map(start_at).collect();
     starts.sort_by(|a, b| a.0.total_cmp(&b.0));
     let turns = starts.first().is_some_and(|(_, model, _)| model.turns);
-    let fits = starts.into_iter().take(if turns { STARTS } else { 1 }).filter_map(|(_, model, start)| {
-        let minimum = minimise(&model, evidence, &start);
-        let minimum = canonical(&model, minimum, evidence)?;
-        Some((model, minimum))
+    // Several starts are brought near a minimum; only the best of them is fitted to the end.
+    let near = starts.into_iter().take(if turns { STARTS } else { 1 }).map(|(_, model, start)| {
+        let state = approach(&model, evidence, &start);
+        (cost(&model, evidence, &state), model, state)
     });
-    fits.min_by(|a, b| a.1.cost.total_cmp(&b.1.cost))
+    let (_, model, state) = near.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let minimum = minimise(&model, evidence, &state);
+    let minimum = canonical(&model, minimum, evidence)?;
+    Some((model, minimum))
 }
 
 /// The same solids under parameter values that the template admits: as they are, or with two parameters exchanged
@@ -140,6 +143,24 @@ fn score(context: Context, model: &Model, minimum: &Minimum, evidence: &Evidence
         score += context.config.memory_boost.ln();
     }
     score
+}
+
+/// A residual up to this many standard deviations counts as explained.
+const EXPLAINED: f64 = 3.0;
+
+impl Hypothesis<'_> {
+    /// Share of the evidence that the fit explains: of the surface points, and of the outline points that are the
+    /// thing's own.
+    pub fn explained(&self, evidence: &Evidence) -> (f64, f64) {
+        let mut residuals = Vec::new();
+        self.model.residuals(&self.minimum.state, evidence, &mut residuals);
+        let (points, outline) = residuals.split_at(evidence.points.len().min(residuals.len()));
+        let share = |good: usize, all: usize| if all == 0 { 1.0 } else { good as f64 / all as f64 };
+        let fits = |r: &&f64| r.abs() < EXPLAINED;
+        let own: Vec<f64> =
+            outline.iter().zip(&evidence.outline).filter(|(_, p)| p.kind == OutlineKind::Own).map(|(r, _)| *r).collect();
+        (share(points.iter().filter(fits).count(), points.len()), share(own.iter().filter(fits).count(), own.len()))
+    }
 }
 
 /// Probabilities of the nouns under which the hypotheses are spoken of, best first.

@@ -10,7 +10,7 @@
 //! | [`config`], [`grounder`] | thresholds; the whole pipeline |
 //! | [`frames`], [`level`] | colour and depth files; the camera pose over the dominant plane when none is known |
 //! | `scan`, `support`, `scene`, `own` | pixels to points, the plane and its extent, heights, the robot's own pixels |
-//! | `segments`, `patches` | what stands on the plane, what lies in it |
+//! | `segments`, `joins`, `patches` | what stands on the plane, what lies in it |
 //! | `measure`, `fit`, `hypotheses` | first guesses, template fits, the choice among templates |
 //! | `expected`, `raster` | the comparison with memory's expectation, ray-cast |
 //! | [`overlay`], [`labels`], [`metrics`] | pictures for a person, label images, segmentation scores |
@@ -29,6 +29,7 @@ mod expected;
 mod fit;
 mod grid;
 mod hypotheses;
+mod joins;
 mod measure;
 mod own;
 mod patches;

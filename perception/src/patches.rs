@@ -4,6 +4,7 @@ use crate::{
     fit::{Evidence, OutlineKind, OutlinePoint},
     measure::{self, Rectangle},
     scene::Scene,
+    segments::NONE,
 };
 use glam::DVec2;
 
@@ -227,7 +228,7 @@ fn outline(scene: &Scene, ground: &[Ground], pixels: &[usize]) -> Vec<OutlinePoi
                 Some(Ground::Unknown) | None => OutlineKind::Cut,
             };
             let at = DVec2::new(scene.grid.column(pixel) as f64, scene.grid.row(pixel) as f64);
-            points.push(OutlinePoint { pixel: at + DVec2::new(dx as f64, dy as f64) * 0.5, sigma_px: 1.0, kind });
+            points.push(OutlinePoint { pixel: at + DVec2::new(dx as f64, dy as f64) * 0.5, sigma_px: 1.0, kind, beyond: NONE });
         }
     }
     points

@@ -18,6 +18,8 @@ pub(crate) struct Scene<'a> {
     pub noise_ratio: f64,
     /// Point of every pixel in the support frame, from the smoothed depth; NaN where there is none.
     pub point: Vec<Vec3>,
+    /// Height noise of the smoothed depth at every pixel, metres.
+    height_sigma_m: Vec<f32>,
     /// Pixels that belong to the robot itself.
     pub own: Vec<bool>,
     /// Pixels on the plane and within its extent.
@@ -40,15 +42,17 @@ impl<'a> Scene<'a> {
         let offset = plane.offset + normal.dot(camera_pose.translation);
         let world = Pose::new(normal * offset, DQuat::from_rotation_arc(DVec3::Z, normal));
         let camera = world.inverse() * *camera_pose;
-        let point = points(scan, &camera);
+        let noise_ratio = plane.noise_ratio.clamp(0.25, 2.0);
+        let (point, height_sigma_m) = points(scan, &camera, noise_ratio as f32, config);
         let mut scene = Scene {
             scan,
             config,
             grid: scan.grid,
             camera,
             world,
-            noise_ratio: plane.noise_ratio.clamp(0.25, 2.0),
+            noise_ratio,
             point,
+            height_sigma_m,
             own,
             in_plane: Vec::new(),
             rising: Vec::new(),
@@ -59,15 +63,11 @@ impl<'a> Scene<'a> {
         scene
     }
 
-    /// Height noise of the smoothed depth at a pixel, metres.
-    pub fn height_sigma_m(&self, pixel: usize) -> f32 {
-        let z = f64::from(self.scan.smooth[pixel]);
-        let down = self.camera.transform_vector(self.scan.ray(pixel).normalize()).z.abs();
-        (self.noise_ratio * self.config.depth_sigma_m(z) * down) as f32
-    }
-    /// Height above which a pixel stands on the plane rather than in it.
+    /// Height above which a pixel stands on the plane rather than in it. The share of the distance stands for the
+    /// ripples of a structured-light or stereo camera, which no smoothing removes.
     pub fn height_limit_m(&self, pixel: usize) -> f32 {
-        self.config.min_height_m.max(3.0 * self.height_sigma_m(pixel))
+        let ripple = 0.006 * self.scan.smooth[pixel];
+        self.config.min_height_m.max(3.0 * self.height_sigma_m[pixel]).max(ripple)
     }
     /// Where the viewing ray of an image point meets the plane, support frame x and y.
     pub fn foot_of_ray(&self, pixel: DVec2) -> Option<DVec2> {
@@ -84,6 +84,12 @@ impl<'a> Scene<'a> {
         let depth = f64::from(self.scan.depth[pixel]);
         (depth > 0.0).then(|| self.camera.transform_point(self.scan.ray(pixel) * depth))
     }
+    /// Height over the plane that only the lowest twenty-fifth of some pixels does not reach, metres.
+    pub fn lowest_m(&self, pixels: &[usize]) -> f64 {
+        let mut heights: Vec<f32> = pixels.iter().filter(|&&i| self.is_known(i)).map(|&i| self.point[i].z).collect();
+        heights.sort_by(f32::total_cmp);
+        heights.get(heights.len() / 25).map_or(0.0, |h| f64::from(*h))
+    }
     pub fn is_known(&self, pixel: usize) -> bool {
         !self.point[pixel].z.is_nan()
     }
@@ -96,11 +102,13 @@ impl<'a> Scene<'a> {
         let (labels, sizes) = self.grid.components(&solid, |_, _| true);
         let largest = (0..sizes.len()).max_by_key(|&l| (sizes[l], std::cmp::Reverse(l)));
         self.in_plane = (0..mask.len()).map(|i| mask[i] && Some(labels[i] as usize) == largest).collect();
-        let feet: Vec<DVec2> = (0..mask.len())
-            .step_by(3)
-            .filter(|&i| self.in_plane[i])
-            .map(|i| self.point[i].truncate().as_dvec2())
-            .collect();
+        // The plane's image is a projective map, which keeps lines straight: the ends of the rows hold the hull.
+        let mut feet: Vec<DVec2> = Vec::new();
+        for row in 0..self.grid.height {
+            let line = self.grid.index(0, row)..self.grid.index(0, row) + self.grid.width;
+            let ends = [line.clone().find(|&i| self.in_plane[i]), line.rev().find(|&i| self.in_plane[i])];
+            feet.extend(ends.into_iter().flatten().map(|i| self.point[i].truncate().as_dvec2()));
+        }
         self.outline = convex_hull(feet);
     }
 
@@ -127,22 +135,30 @@ impl<'a> Scene<'a> {
     }
 }
 
-fn points(scan: &Scan, camera: &Pose) -> Vec<Vec3> {
-    let axes = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| camera.transform_vector(axis));
+/// The point and the height noise of every pixel.
+fn points(scan: &Scan, camera: &Pose, noise_ratio: f32, config: &GrounderConfig) -> (Vec<Vec3>, Vec<f32>) {
+    let axes = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| camera.transform_vector(axis).as_vec3());
+    let eye = camera.translation.as_vec3();
     let mut points = Vec::with_capacity(scan.grid.len());
+    let mut sigma_m = Vec::with_capacity(scan.grid.len());
+    let intrinsics = scan.intrinsics;
     for row in 0..scan.grid.height {
-        let y = (row as f64 - scan.intrinsics.cy) / scan.intrinsics.fy;
+        let y = ((row as f64 - intrinsics.cy) / intrinsics.fy) as f32;
+        let along_row = axes[1] * y + axes[2];
         for column in 0..scan.grid.width {
-            let depth = f64::from(scan.smooth[scan.grid.index(column, row)]);
+            let depth = scan.smooth[scan.grid.index(column, row)];
             if depth <= 0.0 {
                 points.push(Vec3::NAN);
+                sigma_m.push(0.0);
                 continue;
             }
-            let x = (column as f64 - scan.intrinsics.cx) / scan.intrinsics.fx;
-            points.push((camera.translation + (axes[0] * x + axes[1] * y + axes[2]) * depth).as_vec3());
+            let x = ((column as f64 - intrinsics.cx) / intrinsics.fx) as f32;
+            let ray = axes[0] * x + along_row;
+            points.push(eye + ray * depth);
+            sigma_m.push(noise_ratio * config.depth_sigma_m(f64::from(depth)) as f32 * ray.z.abs());
         }
     }
-    points
+    (points, sigma_m)
 }
 
 /// The convex hull of points, counter-clockwise (Andrew's monotone chain); fewer than three points are returned as

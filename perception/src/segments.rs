@@ -3,6 +3,7 @@
 
 use crate::{grid::Grid, scene::Scene};
 use glam::Vec3;
+use std::collections::BTreeMap;
 
 /// Label of pixels that belong to no segment.
 pub(crate) const NONE: u32 = u32::MAX;
@@ -13,6 +14,8 @@ pub(crate) struct Segments {
     pub labels: Vec<u32>,
     /// Number of segments.
     pub count: usize,
+    /// Pixels of the inside of hollow things: they belong to their segment but not to its outer surface.
+    pub inner: Vec<bool>,
 }
 
 impl Segments {
@@ -60,7 +63,8 @@ pub(crate) fn split(scene: &Scene) -> Segments {
         }
     }
     grow(scene, &mut labels, 12);
-    let mut segments = Segments { count: sizes.len(), labels };
+    let inner = vec![false; labels.len()];
+    let mut segments = Segments { count: sizes.len(), labels, inner };
     adopt_remains(scene, &mut segments);
     merge_smooth(scene, &normals, &mut segments);
     drop_small(scene, &mut segments);
@@ -165,15 +169,31 @@ fn grow(scene: &Scene, labels: &mut [u32], reach_px: usize) {
     }
 }
 
-/// Connected rests that no core was found in, small or thin things, become segments of their own.
+/// Connected rests that no core was found in: those that touch a segment are part of it, the others, small or thin
+/// things, become segments of their own.
 fn adopt_remains(scene: &Scene, segments: &mut Segments) {
     let rest: Vec<bool> = (0..scene.grid.len()).map(|i| scene.rising[i] && segments.labels[i] == NONE).collect();
     let joined = |a: usize, b: usize| (scene.scan.smooth[a] - scene.scan.smooth[b]).abs() < 0.012;
     let (labels, sizes) = scene.grid.components(&rest, joined);
-    for (index, &label) in labels.iter().enumerate() {
-        if sizes.get(label as usize).is_some_and(|size| *size >= scene.config.min_segment_px) {
-            segments.labels[index] = segments.count as u32 + label;
+    let mut touches: BTreeMap<u32, BTreeMap<u32, usize>> = BTreeMap::new();
+    for index in (0..scene.grid.len()).filter(|&i| rest[i]) {
+        for near in scene.grid.neighbours(index).filter(|&n| segments.labels[n] != NONE) {
+            if scene.point[near].distance(scene.point[index]) < 0.015 {
+                *touches.entry(labels[index]).or_default().entry(segments.labels[near]).or_insert(0) += 1;
+            }
         }
+    }
+    let owner = |rest: u32| -> u32 {
+        let most = touches.get(&rest).and_then(|near| near.iter().max_by_key(|(_, count)| **count));
+        match most {
+            Some((segment, count)) if *count >= 5 => *segment,
+            _ if sizes[rest as usize] >= scene.config.min_segment_px => segments.count as u32 + rest,
+            _ => NONE,
+        }
+    };
+    let owners: Vec<u32> = (0..sizes.len() as u32).map(owner).collect();
+    for index in (0..scene.grid.len()).filter(|&i| rest[i]) {
+        segments.labels[index] = owners[labels[index] as usize];
     }
     segments.count += sizes.len();
 }
@@ -205,8 +225,8 @@ fn borders(
     scene: &Scene,
     normals: &[Vec3],
     segments: &Segments,
-) -> std::collections::BTreeMap<(u32, u32), (usize, usize)> {
-    let mut borders = std::collections::BTreeMap::new();
+) -> BTreeMap<(u32, u32), (usize, usize)> {
+    let mut borders = BTreeMap::new();
     let reach = BEND_STEP as isize + 1;
     for index in 0..grid.len() {
         let a = segments.labels[index];

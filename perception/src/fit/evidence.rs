@@ -33,6 +33,8 @@ pub(crate) struct OutlinePoint {
     pub pixel: DVec2,
     pub sigma_px: f64,
     pub kind: OutlineKind,
+    /// Segment on the other side, [`NONE`] for the surface and everything else.
+    pub beyond: u32,
 }
 
 /// Everything that a fit compares a template with.
@@ -54,7 +56,7 @@ const CORRELATED_PX: f64 = 15.0;
 /// Outline pixels over which errors are about equal.
 const CORRELATED_OUTLINE_PX: f64 = 3.0;
 /// How far the other side of a hole is looked for, pixels.
-const HOLE_REACH: usize = 14;
+const HOLE_REACH: usize = 32;
 
 impl Evidence {
     /// The evidence of a segment of standing pixels.
@@ -66,7 +68,8 @@ impl Evidence {
             let sigma = noise * scene.config.depth_sigma_m(f64::from(scene.scan.depth[pixel]));
             Some(SurfacePoint { position, sigma_m: sigma.hypot(0.0015) })
         };
-        let points: Vec<SurfacePoint> = pixels.iter().step_by(step).filter_map(surface_point).collect();
+        let outer = |pixel: &&usize| !segments.inner[**pixel];
+        let points: Vec<SurfacePoint> = pixels.iter().filter(outer).step_by(step).filter_map(surface_point).collect();
         let outline = outline(scene, segments, pixels);
         Evidence::new(scene, points, pixels.len(), outline)
     }
@@ -87,9 +90,20 @@ impl Evidence {
         }
     }
 
+    /// Height of the top over the plane, metres: of the points, all but the highest twentieth.
+    pub fn top_m(&self) -> f64 {
+        let mut heights: Vec<f64> = self.points.iter().map(|p| p.position.z).collect();
+        heights.sort_by(f64::total_cmp);
+        heights.get(heights.len() * 19 / 20).copied().unwrap_or(0.0)
+    }
     /// Number of independent measurements.
     pub fn independent(&self) -> f64 {
         self.points.len() as f64 * self.point_weight + self.outline.len() as f64 * self.outline_weight
+    }
+    /// Share of the outline that borders a segment in one of the given ways.
+    pub fn border_share(&self, segment: u32, kinds: &[OutlineKind]) -> f64 {
+        let borders = |p: &&OutlinePoint| p.beyond == segment && kinds.contains(&p.kind);
+        self.outline.iter().filter(borders).count() as f64 / self.outline.len().max(1) as f64
     }
     /// Share of the outline that something else, or the image border, cuts off.
     pub fn cut_share(&self) -> f64 {
@@ -109,16 +123,17 @@ fn outline(scene: &Scene, segments: &Segments, pixels: &[usize]) -> Vec<OutlineP
             if next.is_some_and(|n| segments.labels[n] == label) {
                 continue;
             }
-            let Some((kind, over_hole)) = other_side(scene, segments, label, pixel, dx, dy) else { continue };
+            let Some((kind, beyond, over_hole)) = other_side(scene, segments, label, pixel, dx, dy) else { continue };
             let at = DVec2::new(scene.grid.column(pixel) as f64, scene.grid.row(pixel) as f64);
             let sigma_px = scene.config.outline_sigma_px * if over_hole { 1.7 } else { 1.0 };
-            points.push(OutlinePoint { pixel: at + DVec2::new(dx as f64, dy as f64) * 0.5, sigma_px, kind });
+            points.push(OutlinePoint { pixel: at + DVec2::new(dx as f64, dy as f64) * 0.5, sigma_px, kind, beyond });
         }
     }
     points
 }
 
-/// What lies beyond a border pixel, and whether a hole had to be crossed; `None` if the segment goes on beyond it.
+/// What lies beyond a border pixel, which segment that is, and whether a hole had to be crossed; `None` if the
+/// segment goes on beyond it.
 fn other_side(
     scene: &Scene,
     segments: &Segments,
@@ -126,18 +141,18 @@ fn other_side(
     pixel: usize,
     dx: isize,
     dy: isize,
-) -> Option<(OutlineKind, bool)> {
+) -> Option<(OutlineKind, u32, bool)> {
     let z = scene.scan.smooth[pixel];
     let tolerance = 0.006 + 0.006 * z;
     for step in 1..=HOLE_REACH as isize {
         let Some(at) = scene.grid.offset(pixel, dx * step, dy * step) else {
-            return Some((OutlineKind::Cut, step > 1));
+            return Some((OutlineKind::Cut, NONE, step > 1));
         };
         if segments.labels[at] == label {
             return None;
         }
         if scene.own[at] {
-            return Some((OutlineKind::Cut, step > 1));
+            return Some((OutlineKind::Cut, NONE, step > 1));
         }
         if scene.is_known(at) {
             let gap = scene.scan.smooth[at] - z;
@@ -148,8 +163,8 @@ fn other_side(
             } else {
                 OutlineKind::Contact
             };
-            return Some((kind, step > 1));
+            return Some((kind, segments.labels[at], step > 1));
         }
     }
-    Some((OutlineKind::Own, true))
+    Some((OutlineKind::Own, NONE, true))
 }

@@ -5,8 +5,10 @@ use nalgebra::{DMatrix, DVector};
 
 /// Weight of the uniform outlier class against the peak of the inliers' density.
 const OUTLIERS: f64 = 0.02;
-/// Widening of the standard deviations, stage by stage, and the steps of each.
-const STAGES: [(f64, usize); 3] = [(4.0, 6), (2.0, 5), (1.0, 8)];
+/// Widening of the standard deviations on the way to a minimum, stage by stage, and the steps of each.
+const APPROACH: [(f64, usize); 2] = [(4.0, 5), (2.0, 4)];
+/// A step that gains less (negative log likelihood) is the last one.
+const WORTHWHILE: f64 = 0.02;
 /// A weak pull towards the start keeps unseen directions from drifting, metres or radians.
 const PULL_SIGMA: f64 = 0.3;
 
@@ -40,13 +42,19 @@ impl Share {
     }
 }
 
-/// Fits a model from `start`. The start is kept where the fitted state does not explain held-out evidence better.
+/// Moves a rough start near to a minimum, with wide standard deviations.
+pub(crate) fn approach(model: &Model, evidence: &Evidence, start: &[f64]) -> Vec<f64> {
+    let problem = Problem { model, evidence, start, frozen: None };
+    APPROACH.iter().fold(start.to_vec(), |state, (widening, steps)| {
+        problem.descend(state, *widening, *steps, Share::Fitted)
+    })
+}
+
+/// Fits a model from `start`, which [`approach`] has brought near. The start is kept where the fitted state does not
+/// explain held-out evidence better.
 pub(crate) fn minimise(model: &Model, evidence: &Evidence, start: &[f64]) -> Minimum {
     let problem = Problem { model, evidence, start, frozen: None };
-    let mut state = start.to_vec();
-    for (widening, steps) in STAGES {
-        state = problem.descend(state, widening, steps, Share::Fitted);
-    }
+    let mut state = problem.descend(start.to_vec(), 1.0, 8, Share::Fitted);
     let held_out = |state: &[f64]| problem.cost(state, 1.0, Share::HeldOut);
     if held_out(&state) > held_out(start) {
         state = start.to_vec();
@@ -119,7 +127,7 @@ impl Problem<'_> {
                 self.model.residuals(&next, self.evidence, &mut next_residuals);
                 let next_cost = self.cost_of(&next_residuals, widening, share) + self.pull(&next);
                 if next_cost < cost {
-                    improved = cost - next_cost > 1e-3;
+                    improved = cost - next_cost > WORTHWHILE;
                     (state, residuals, cost) = (next, next_residuals, next_cost);
                     damping = (damping * 0.2).max(1e-7);
                     break;

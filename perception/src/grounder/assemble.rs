@@ -1,19 +1,17 @@
 //! From ranked hypotheses to a grounded object: calibrated uncertainty, canonical heading, appearance, confidence.
 
 use crate::{
-    fit::{Evidence, OutlineKind, observability},
+    fit::{Evidence, observability},
     hypotheses::{self, Context, Hypothesis},
     scene::Scene,
 };
 use acm_concept::{
     object::{GroundedObject, GroundedPart, Observability, ParameterEstimate, PixelSupport, PoseEstimate},
     pose::Pose,
-    template::{Unit, YawSymmetry},
+    template::{SeenBy, Unit, YawSymmetry},
 };
 use glam::{DQuat, DVec3};
 
-/// A residual up to this many standard deviations counts as explained.
-const EXPLAINED: f64 = 3.0;
 /// A thing is truncated if more than this share of its outline is not its own.
 const CUT_SHARE: f64 = 0.12;
 
@@ -35,17 +33,19 @@ pub(super) fn object(
     let best = ranked.iter().find(offers).or(ranked.first())?;
     let mut mask = vec![false; scene.grid.len()];
     for &pixel in pixels {
-        mask[pixel] = scene.scan.depth[pixel] > 0.0;
+        mask[pixel] = scene.scan.depth[pixel] > 0.0 || best.model.template.seen_by == SeenBy::Color;
     }
     let support = PixelSupport::from_mask(&mask, scene.grid.width)?;
     let appearance = scene.scan.appearance(&inner(scene, &mask, pixels));
+    let (on_surface, on_outline) = best.explained(evidence);
+    let explained = on_surface * (0.4 + 0.6 * on_outline);
     let part = part(scene, best, evidence, appearance)?;
     Some(GroundedObject {
         category: category.clone(),
         categories,
         parts: vec![part],
         appearance,
-        confidence: (certainty * explained(best, evidence) * (1.0 - (-(pixels.len() as f64) / 150.0).exp()))
+        confidence: (certainty * explained * (1.0 - (-(pixels.len() as f64) / 150.0).exp()))
             .clamp(0.0, 1.0),
         truncated: evidence.cut_share() > CUT_SHARE,
         expected: None,
@@ -143,18 +143,4 @@ impl Calibration {
     fn angle(&self, fitted: f64, reach_m: f64) -> f64 {
         (self.factor * fitted).hypot(0.5 * self.systematic_m / reach_m.max(0.005)).min(std::f64::consts::PI)
     }
-}
-
-/// Share of the evidence that the fit explains: surface points, and outline points that are the thing's own.
-fn explained(hypothesis: &Hypothesis, evidence: &Evidence) -> f64 {
-    let mut residuals = Vec::new();
-    hypothesis.model.residuals(&hypothesis.minimum.state, evidence, &mut residuals);
-    let (points, outline) = residuals.split_at(evidence.points.len().min(residuals.len()));
-    let share = |good: usize, all: usize| if all == 0 { 1.0 } else { good as f64 / all as f64 };
-    let fits = |r: &f64| r.abs() < EXPLAINED;
-    let on_surface = share(points.iter().filter(|r| fits(r)).count(), points.len());
-    let own: Vec<f64> =
-        outline.iter().zip(&evidence.outline).filter(|(_, p)| p.kind == OutlineKind::Own).map(|(r, _)| *r).collect();
-    let on_outline = share(own.iter().filter(|r| fits(r)).count(), own.len());
-    on_surface * (0.4 + 0.6 * on_outline)
 }

@@ -3,7 +3,6 @@
 use crate::{
     fit::{Base, Evidence, OutlineKind},
     hypotheses::Hypothesis,
-    scene::Scene,
 };
 use acm_concept::solid::PlacedSolid;
 use glam::{DVec2, DVec3};
@@ -65,18 +64,4 @@ fn bottom_is_own(evidence: &Evidence) -> bool {
         own += usize::from(point.kind == OutlineKind::Own);
     }
     all > 4 && own * 2 > all
-}
-
-/// Height over the plane that only the lowest twenty-fifth of a segment's pixels does not reach, metres.
-pub(super) fn lowest_m(scene: &Scene, pixels: &[usize]) -> f64 {
-    let mut heights: Vec<f32> = pixels.iter().filter(|&&i| scene.is_known(i)).map(|&i| scene.point[i].z).collect();
-    heights.sort_by(f32::total_cmp);
-    heights.get(heights.len() / 25).map_or(0.0, |h| f64::from(*h))
-}
-
-/// Height of the top over the plane, metres: of the measured points, all but the highest twentieth.
-pub(super) fn top_m(evidence: &Evidence) -> f64 {
-    let mut heights: Vec<f64> = evidence.points.iter().map(|p| p.position.z).collect();
-    heights.sort_by(f64::total_cmp);
-    heights.get(heights.len() * 19 / 20).copied().unwrap_or(0.0)
 }

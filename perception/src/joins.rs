@@ -1,0 +1,148 @@
+//! Joins segments that are one thing seen in pieces: the inside and outside of something hollow, and the two ends of
+//! something that a nearer thing covers in the middle.
+
+use crate::{
+    fit::{Base, Evidence, OutlineKind},
+    hypotheses::{self, Context, Hypothesis, Measured},
+    scene::Scene,
+    segments::{NONE, Segments},
+};
+use acm_concept::{solid::PlacedSolid, template::SeenBy};
+use glam::DVec2;
+
+/// Most joins in one frame.
+const MAX_JOINS: usize = 24;
+/// Tops of pieces of one thing are level within this.
+const LEVEL_M: f64 = 0.016;
+
+/// A segment with what the tests look at.
+struct Piece {
+    label: u32,
+    pixels: Vec<usize>,
+    evidence: Evidence,
+    top_m: f64,
+    lowest_m: f64,
+}
+
+impl Piece {
+    /// Share of the surface points near the top: large where a top face is seen, small on a wall.
+    fn top_share(&self) -> f64 {
+        let near = |p: &&crate::fit::SurfacePoint| p.position.z > self.top_m - 0.008;
+        self.evidence.points.iter().filter(near).count() as f64 / self.evidence.points.len().max(1) as f64
+    }
+}
+
+/// Joins pieces until no two belong together.
+pub(crate) fn join(scene: &Scene, segments: &mut Segments, context: Context) {
+    for _ in 0..MAX_JOINS {
+        let pieces = pieces(scene, segments);
+        let pair = |test: &dyn Fn(&Piece, &Piece) -> Option<bool>| {
+            pieces.iter().find_map(|a| {
+                pieces.iter().filter(|b| b.label != a.label).find_map(|b| test(a, b).map(|inner| (a.label, b.label, inner)))
+            })
+        };
+        let found = pair(&|a, b| is_floor_of(a, b).then_some(true))
+            .or_else(|| pair(&|a, b| is_fragment_of(a, b).then_some(false)))
+            .or_else(|| pair(&|a, b| is_inside_of(scene, segments, context, a, b).then_some(true)))
+            .or_else(|| pair(&|a, b| is_other_end(scene, segments, context, a, b).then_some(false)));
+        let Some((outer, other, is_inner)) = found else { return };
+        for (label, inner) in segments.labels.iter_mut().zip(&mut segments.inner).filter(|(l, _)| **l == other) {
+            *label = outer;
+            *inner |= is_inner;
+        }
+    }
+}
+
+fn pieces(scene: &Scene, segments: &Segments) -> Vec<Piece> {
+    let of_label = |(label, pixels): (usize, Vec<usize>)| {
+        let evidence = Evidence::of_segment(scene, segments, &pixels);
+        if pixels.is_empty() || evidence.points.is_empty() {
+            return None;
+        }
+        let (top_m, lowest_m) = (evidence.top_m(), scene.lowest_m(&pixels));
+        Some(Piece { label: label as u32, pixels, evidence, top_m, lowest_m })
+    };
+    segments.pixels().into_iter().enumerate().filter_map(of_label).collect()
+}
+
+/// Whether `floor` lies within `outer`: bordered by it nearly all round, by nothing farther, and lower.
+fn is_floor_of(outer: &Piece, floor: &Piece) -> bool {
+    let bordered = floor.evidence.border_share(outer.label, &[OutlineKind::Cut, OutlineKind::Contact]);
+    bordered > 0.6 && floor.top_m < outer.top_m + 0.005 && floor.pixels.len() < outer.pixels.len()
+}
+
+/// Whether `small` is a rim, handle or the like of `whole`: it touches it, neither reaches the plane nor rises above
+/// the whole, and so can stand on nothing else.
+fn is_fragment_of(whole: &Piece, small: &Piece) -> bool {
+    let touches = small.evidence.border_share(whole.label, &[OutlineKind::Contact]);
+    touches > 0.15
+        && small.pixels.len() * 3 < whole.pixels.len()
+        && small.lowest_m > 0.022
+        && small.top_m < whole.top_m + 0.005
+}
+
+/// Whether `inner` is the inside of a hollow thing whose outside is `outer`: partly covered by it, its rim level
+/// with the outer's, without a top face, and within the solid that fits the common outline.
+fn is_inside_of(scene: &Scene, segments: &Segments, context: Context, outer: &Piece, inner: &Piece) -> bool {
+    let covered = inner.evidence.border_share(outer.label, &[OutlineKind::Cut, OutlineKind::Contact]);
+    if covered < 0.2 || (outer.top_m - inner.top_m).abs() > LEVEL_M || inner.top_share() > 0.4 || outer.lowest_m > 0.04 {
+        return false;
+    }
+    let joint = union(scene, segments, outer, inner, true);
+    let Some(best) = fit(context, &joint, outer.lowest_m) else { return false };
+    let (_, on_outline) = best.explained(&joint);
+    let solids = best.model.solids(&best.minimum.state);
+    let depth: Vec<f64> = inner.evidence.points.iter().map(|p| outside_m(&solids, p.position)).collect();
+    let share = |limit: f64| depth.iter().filter(|d| **d < limit).count() as f64 / depth.len() as f64;
+    on_outline > 0.5 && share(0.002) > 0.6 && share(0.012) > 0.8
+}
+
+/// Whether two pieces are the ends of one thing that a nearer one covers in the middle: one solid explains both
+/// better than two do.
+fn is_other_end(scene: &Scene, segments: &Segments, context: Context, a: &Piece, b: &Piece) -> bool {
+    let cut_by = |piece: &Piece, label: u32| label != NONE && piece.evidence.border_share(label, &[OutlineKind::Cut]) > 0.08;
+    let occluded_alike = a.evidence.outline.iter().any(|p| cut_by(a, p.beyond) && cut_by(b, p.beyond));
+    if a.label > b.label || !occluded_alike || (a.top_m - b.top_m).abs() > LEVEL_M || a.lowest_m.max(b.lowest_m) > 0.03 {
+        return false;
+    }
+    let joint = union(scene, segments, a, b, false);
+    let (Some(one), Some(left), Some(right)) =
+        (fit(context, &joint, 0.0), fit(context, &a.evidence, 0.0), fit(context, &b.evidence, 0.0))
+    else {
+        return false;
+    };
+    let penalty = |h: &Hypothesis, evidence: &Evidence| {
+        h.minimum.cost + 0.5 * h.minimum.state.len() as f64 * evidence.independent().max(2.0).ln()
+    };
+    // The joint evidence is thinned to the same number of points: compare per independent measurement.
+    let apart = penalty(&left, &a.evidence) + penalty(&right, &b.evidence);
+    let share = (a.evidence.independent() + b.evidence.independent()) / joint.independent().max(1.0);
+    let together = penalty(&one, &joint) * share.max(1.0);
+    let (on_surface, on_outline) = one.explained(&joint);
+    // Systematic errors of the sensor tell against the larger solid; two things in one line are rare.
+    together < 1.5 * apart + 10.0 && on_surface > 0.9 && on_outline > 0.85
+}
+
+/// The evidence of two pieces as one; without the inner piece's surface if it is the inside of something hollow.
+fn union(scene: &Scene, segments: &Segments, a: &Piece, b: &Piece, hollow: bool) -> Evidence {
+    let mut joined = Segments { labels: segments.labels.clone(), count: segments.count, inner: segments.inner.clone() };
+    for &pixel in &b.pixels {
+        joined.labels[pixel] = a.label;
+        joined.inner[pixel] |= hollow;
+    }
+    let mut pixels: Vec<usize> = a.pixels.iter().chain(&b.pixels).copied().collect();
+    pixels.sort_unstable();
+    Evidence::of_segment(scene, &joined, &pixels)
+}
+
+fn fit<'a>(context: Context<'a>, evidence: &Evidence, base_m: f64) -> Option<Hypothesis<'a>> {
+    let base_m = if base_m > 0.022 { base_m } else { 0.0 };
+    let plan: Vec<DVec2> = evidence.points.iter().map(|p| p.position.truncate()).collect();
+    let height_m = evidence.top_m() - base_m;
+    let measured = Measured { plan, height_m, base: Base::At(base_m), seen_by: SeenBy::Depth };
+    hypotheses::rank(context, &measured, evidence).into_iter().next()
+}
+
+fn outside_m(solids: &[PlacedSolid], point: glam::DVec3) -> f64 {
+    solids.iter().map(|s| s.signed_distance(point)).fold(f64::INFINITY, f64::min)
+}
