@@ -80,6 +80,8 @@ pub(crate) enum FrameGoal {
     Holding(bool),
     /// A function is performed on the object.
     Performed(String),
+    /// Nothing has to be done.
+    Nothing,
 }
 
 /// One form of a verb frame.
@@ -115,6 +117,7 @@ pub(crate) struct Words {
     pub auxiliaries: Vec<Form>,
     pub after_markers: Vec<Form>,
     pub before_markers: Vec<Form>,
+    pub earlier_markers: Vec<Form>,
     pub negations: Vec<Form>,
     pub disturbing: Vec<Form>,
     pub definite: Vec<Form>,
@@ -136,6 +139,7 @@ pub(crate) struct Words {
     pub middle_of: Vec<Form>,
     pub between: Vec<Form>,
     pub whole: Vec<Form>,
+    pub collectives: Vec<Form>,
 }
 
 /// Everything the front end knows of language.

@@ -64,6 +64,11 @@ impl Reader<'_> {
         let mut at = self.skip_links(0);
         while at < self.tokens.len() && statements.len() <= MAX_CLAUSES {
             let words = &self.lexicon.words;
+            if let Some(end) = self.longest(at, &words.earlier_markers).filter(|_| !statements.is_empty()) {
+                main_comes_before = true;
+                at = self.skip_links(end);
+                continue;
+            }
             let (statement, end) = if let Some(end) = self.longest(at, &words.negations) {
                 self.leave(end)?
             } else if let Some(start) = self.longest(at, &words.before_markers) {
@@ -108,6 +113,8 @@ impl Reader<'_> {
         loop {
             let next = if self.is_stop(at) {
                 Some(at + 1)
+            } else if self.longest(at, &words.earlier_markers).is_some() {
+                None
             } else {
                 self.longest(at, &words.connectors).or_else(|| self.longest(at, &words.lead_ins))
             };
@@ -167,7 +174,8 @@ impl Reader<'_> {
 
     fn ends_clause(&self, at: usize) -> bool {
         let words = &self.lexicon.words;
-        let links = [&words.connectors, &words.after_markers, &words.before_markers, &words.negations];
+        let links =
+            [&words.connectors, &words.after_markers, &words.before_markers, &words.earlier_markers, &words.negations];
         at >= self.tokens.len() || self.is_stop(at) || links.iter().any(|forms| self.longest(at, forms).is_some())
     }
 

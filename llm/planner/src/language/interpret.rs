@@ -10,6 +10,7 @@ use crate::{
     task::{Destination, Goal, ObjectReference, Quantity, ReferenceIndex, Span, Subtask, Task, functions_with_effect},
 };
 use acm_concept::template::TemplateLibrary;
+use acm_memory::query::PlaceReference;
 
 /// Affordance of what can carry things.
 const SUPPORTIVE: &str = "supportive";
@@ -61,6 +62,9 @@ struct Interpretation<'a> {
 
 impl Interpretation<'_> {
     fn add(&mut self, clause: &Clause, order: Order, background: bool) -> Result<(), ParseError> {
+        if clause.goal == FrameGoal::Nothing {
+            return self.mention(clause);
+        }
         let goal = self.goal(clause)?;
         let same_but_times = |known: &Goal| match (known, &goal) {
             (Goal::Performed { function: a, object: x, .. }, Goal::Performed { function: b, object: y, .. }) => {
@@ -80,9 +84,22 @@ impl Interpretation<'_> {
         Ok(())
     }
 
+    /// Keeps the thing of a clause without a goal for later pronouns.
+    fn mention(&mut self, clause: &Clause) -> Result<(), ParseError> {
+        if let Some(phrase) = &clause.object {
+            self.reference(phrase, &Role::Mentioned)?;
+        }
+        match clause.place.as_ref().map(|place| &place.kind) {
+            Some(PlaceKind::On(phrase) | PlaceKind::History(Some(phrase), _)) => {
+                self.reference(phrase, &Role::Mentioned).map(|_| ())
+            }
+            _ => Ok(()),
+        }
+    }
+
     fn goal(&mut self, clause: &Clause) -> Result<Goal, ParseError> {
         let role = match &clause.goal {
-            FrameGoal::At => Role::Effect("at"),
+            FrameGoal::At | FrameGoal::Nothing => Role::Effect("at"),
             FrameGoal::Holding(_) => Role::Effect("holding"),
             FrameGoal::Performed(function) => Role::Function(function.clone()),
         };
@@ -98,7 +115,7 @@ impl Interpretation<'_> {
             FrameGoal::Performed(function) => {
                 Goal::Performed { function: function.clone(), object, times: clause.times.unwrap_or(1) }
             }
-            FrameGoal::At => {
+            FrameGoal::At | FrameGoal::Nothing => {
                 let destination = match (&clause.place, clause.history) {
                     (Some(place), _) => self.destination(place, Some(object))?,
                     (None, Some(reference)) => Destination::History { object, reference },
@@ -134,6 +151,11 @@ impl Interpretation<'_> {
             },
             PlaceKind::Beside(phrase, side) => {
                 Destination::Beside { reference: self.reference(phrase, &Role::Mentioned)?, side: *side }
+            }
+            PlaceKind::History(_, PlaceReference::Now) => {
+                return Err(
+                    self.unsupported(place.span, "the place of a thing as it is now is no place to bring things")
+                );
             }
             PlaceKind::History(owner, reference) => {
                 let object = match (owner, moved) {

@@ -208,6 +208,15 @@ impl Reader<'_> {
         self.longest(at, &words.numerals)
     }
 
+    /// The end of the colours and sizes at `at`.
+    pub fn skip_adjectives(&self, mut at: usize) -> usize {
+        let size = |at| self.meaning(at, &self.lexicon.sizes).map(|(_, end)| end);
+        while let Some(end) = self.color(at).map(|(_, end)| end).or_else(|| size(at)) {
+            at = end;
+        }
+        at
+    }
+
     fn color(&self, at: usize) -> Option<(ColorTerm, usize)> {
         let (lightness, at) = self.meaning(at, &self.lexicon.shades).unwrap_or((0.0, at));
         let readings = self.lexicon.colors.iter().filter_map(|(term, forms)| Some((term, self.longest(at, forms)?)));
@@ -315,12 +324,14 @@ impl Reader<'_> {
         let mut own = Vec::new();
         for end in self.class(at, &words.standing).into_iter().chain(self.class(at, &words.sources)) {
             let found = self.bare_places(end, depth + 1);
-            // "the cube from its mat": wherever it stands, so it tells nothing apart.
-            if self.is_word(end, "its") {
-                let things = found.into_iter().filter(|(place, _)| matches!(place.kind, PlaceKind::On(_)));
-                own.extend(things.map(|(_, end)| (phrase.clone(), end)));
-            } else {
-                places.extend(found);
+            // "the cube from its mat", "from the mat it is on": wherever it stands, so it tells nothing apart.
+            let its = self.is_word(end, "its");
+            for (place, end) in found {
+                match &place.kind {
+                    PlaceKind::On(_) if its => own.push((phrase.clone(), end)),
+                    PlaceKind::History(None, PlaceReference::Now) => own.push((phrase.clone(), end)),
+                    _ => places.push((place, end)),
+                }
             }
         }
         let here = places.into_iter().filter(|(place, _)| !matches!(place.kind, PlaceKind::History(..)));
@@ -360,6 +371,7 @@ impl Reader<'_> {
     pub fn bare_places(&self, at: usize, depth: u32) -> Places {
         let mut readings = self.history(at, depth);
         readings.extend(self.middle(at, depth));
+        readings.extend(self.spot_in_the_middle(at, depth));
         let things = self.noun_phrases(at, depth).into_iter();
         readings.extend(things.map(|(phrase, end)| self.place(at, end, PlaceKind::On(phrase))));
         keep_longest_first(&mut readings);
@@ -401,8 +413,29 @@ impl Reader<'_> {
         readings
     }
 
+    /// "the spot in the middle", "the empty space between the mats".
+    fn spot_in_the_middle(&self, at: usize, depth: u32) -> Places {
+        let words = &self.lexicon.words;
+        let start = self.longest(at, &words.definite).unwrap_or(at);
+        let start = self.longest(start, &words.free).unwrap_or(start);
+        let Some(spot) = self.longest(start, &words.places) else { return Vec::new() };
+        let mut readings = self.between(spot, depth);
+        for end in self.class(spot, &words.standing) {
+            readings.extend(self.middle(end, depth));
+        }
+        readings.into_iter().map(|(place, end)| self.place(at, end, place.kind)).collect()
+    }
+
     /// What follows "the middle of".
     fn middle_of(&self, at: usize, of: usize, depth: u32) -> Places {
+        let words = &self.lexicon.words;
+        let article = self.longest(of, &words.definite).unwrap_or(of);
+        if let Some(collective) = self.longest(article, &words.collectives) {
+            if self.is_word(collective, "of") {
+                return self.middle_of(at, collective + 1, depth);
+            }
+            return vec![self.place(at, collective, PlaceKind::Middle(None))];
+        }
         let mut readings = self.pair(at, of, depth);
         for (phrase, end) in self.noun_phrases(of, depth + 1) {
             readings.push(match phrase.quantity {

@@ -204,7 +204,9 @@ impl<'a> Reader<'a> {
         }
         owners
     }
+    /// Words for a place, with adjectives that say nothing more about it here.
     fn spots(&self, at: usize) -> Vec<usize> {
+        let at = self.skip_adjectives(at);
         let mut ends = self.class(at, &self.lexicon.words.places);
         ends.extend(self.noun(at).map(|noun| noun.end));
         ends

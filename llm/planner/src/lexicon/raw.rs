@@ -13,6 +13,7 @@ struct RawWords {
     auxiliaries: Vec<String>,
     after_markers: Vec<String>,
     before_markers: Vec<String>,
+    earlier_markers: Vec<String>,
     negations: Vec<String>,
     disturbing: Vec<String>,
     definite: Vec<String>,
@@ -34,6 +35,7 @@ struct RawWords {
     middle_of: Vec<String>,
     between: Vec<String>,
     whole: Vec<String>,
+    collectives: Vec<String>,
     directions: BTreeMap<Direction, Vec<String>>,
     beside: BTreeMap<String, Vec<String>>,
     sizes: RawSizes,
@@ -171,6 +173,7 @@ fn closed_classes(raw: &RawWords) -> Result<Words, LexiconError> {
         auxiliaries: phrases(&raw.auxiliaries)?,
         after_markers: phrases(&raw.after_markers)?,
         before_markers: phrases(&raw.before_markers)?,
+        earlier_markers: phrases(&raw.earlier_markers)?,
         negations: phrases(&raw.negations)?,
         disturbing: phrases(&raw.disturbing)?,
         definite: phrases(&raw.definite)?,
@@ -192,6 +195,7 @@ fn closed_classes(raw: &RawWords) -> Result<Words, LexiconError> {
         middle_of: phrases(&raw.middle_of)?,
         between: phrases(&raw.between)?,
         whole: phrases(&raw.whole)?,
+        collectives: phrases(&raw.collectives)?,
     })
 }
 
@@ -206,10 +210,11 @@ fn frame(raw: &RawFrame) -> Result<Frame, LexiconError> {
         ("holding", None) => FrameGoal::Holding(true),
         ("not-holding", None) => FrameGoal::Holding(false),
         ("performed", Some(function)) => FrameGoal::Performed(function.clone()),
+        ("nothing", None) => FrameGoal::Nothing,
         ("performed", None) => return Err(wrong("has the goal `performed` and names no function")),
         _ => {
             return Err(wrong(
-                "needs one of the goals at, holding, not-holding, performed; only `performed` has a function",
+                "needs one of the goals at, holding, not-holding, performed, nothing; only `performed` has a function",
             ));
         }
     };
@@ -350,6 +355,9 @@ fn known_words(lexicon: &Lexicon) -> BTreeSet<String> {
         &w.middle,
         &w.middle_of,
         &w.between,
+        &w.whole,
+        &w.collectives,
+        &w.earlier_markers,
     ];
     let classes = closed.into_iter().flatten();
     let directions = lexicon.directions.iter().flat_map(|(_, forms)| forms);
