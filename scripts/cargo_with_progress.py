@@ -77,7 +77,11 @@ def main():
             sys.stderr.flush()
             blank = not line
     progress.finished.set()
-    return child.wait()
+    code = child.wait()
+    if code < 0:
+        say(f"cargo {command[1]} was ended by signal {-code}")
+        return 128 - code
+    return code
 
 
 if __name__ == "__main__":
