@@ -39,7 +39,11 @@ fn main() -> Result<(), Box<dyn Error>> {
         let score = metrics::score(&labels::draw(&percepts).into_raw(), &truth, width);
         println!(
             "{stem}: overlap F {:.3}, boundary F {:.3}, {:.0} % over 0.75, {} of {} objects, {took_ms:.0} ms",
-            score.overlap_f, score.boundary_f, score.share_over_75 * 100.0, score.predicted, score.truth
+            score.overlap_f,
+            score.boundary_f,
+            score.share_over_75 * 100.0,
+            score.predicted,
+            score.truth
         );
         for object in &percepts.objects {
             let part = &object.parts[0];
@@ -48,7 +52,13 @@ fn main() -> Result<(), Box<dyn Error>> {
                 .iter()
                 .map(|p| format!("{} {:.0}+-{:.0} mm {:?}", p.name, p.value * 1e3, p.sigma * 1e3, p.observability))
                 .collect();
-            println!("    {} {:.2}, {} px: {}", object.category, object.confidence, object.support.count, sizes.join(", "));
+            println!(
+                "    {} {:.2}, {} px: {}",
+                object.category,
+                object.confidence,
+                object.support.count,
+                sizes.join(", ")
+            );
         }
         if let Some(folder) = &overlays {
             overlay::draw(&frame, &percepts, &[], &library).save(Path::new(folder).join(format!("{stem}.png")))?;
@@ -62,7 +72,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     println!(
         "mean of {frames_scored} frames: overlap F {:.3}, boundary F {:.3}, {:.0} % of {objects} objects over 0.75, {:.0} ms",
-        sums[0] / frames_scored, sums[1] / frames_scored, 100.0 * sums[3] / objects, sums[2] / frames_scored
+        sums[0] / frames_scored,
+        sums[1] / frames_scored,
+        100.0 * sums[3] / objects,
+        sums[2] / frames_scored
     );
     Ok(())
 }

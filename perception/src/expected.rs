@@ -2,11 +2,12 @@
 
 use crate::{
     raster::{self, Cast},
+    scan::Tint,
     scene::Scene,
     segments::{NONE, Segments},
 };
 use acm_concept::{
-    color::{Appearance, Lab},
+    color::Appearance,
     expectation::{Expectation, ExpectedObject},
     ids::ObjectId,
     object::{ExpectedView, GroundedObject, GroundedPart, SupportPlane, Visibility},
@@ -124,17 +125,12 @@ fn flat_vote(scene: &Scene, ghost: &Ghost, support: &SupportPlane, pixel: usize)
     if scene.own[pixel] || scene.rising[pixel] {
         return Vote::Nearer;
     }
-    let (own, bare) = (tint(&ghost.appearance.mean), tint(&support.appearance.mean));
-    let distance = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
-    if !scene.is_known(pixel) || distance(own, bare) < 8.0 {
+    let (own, bare) = (Tint::of(&ghost.appearance.mean), Tint::of(&support.appearance.mean));
+    if !scene.is_known(pixel) || own.distance(&bare) < 8.0 {
         return Vote::Unmeasured;
     }
-    let here = scene.scan.tint(pixel).map(f64::from);
-    if distance(here, own) < distance(here, bare) { Vote::Agrees } else { Vote::Farther }
-}
-
-fn tint(lab: &Lab) -> [f64; 2] {
-    [80.0 * lab.a / (lab.l + 16.0), 80.0 * lab.b / (lab.l + 16.0)]
+    let here = scene.scan.tint(pixel);
+    if here.distance(&own) < here.distance(&bare) { Vote::Agrees } else { Vote::Farther }
 }
 
 /// The verdicts on all expected objects.

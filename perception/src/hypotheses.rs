@@ -3,7 +3,7 @@
 
 use crate::{
     config::GrounderConfig,
-    fit::{Base, Evidence, Minimum, OutlineKind, Model, approach, cost, minimise, rough_cost},
+    fit::{Base, Evidence, Minimum, Model, OutlineKind, approach, cost, minimise, rough_cost},
     measure::{self, Rectangle},
 };
 use acm_concept::template::{SeenBy, Template, TemplateLibrary};
@@ -157,8 +157,12 @@ impl Hypothesis<'_> {
         let (points, outline) = residuals.split_at(evidence.points.len().min(residuals.len()));
         let share = |good: usize, all: usize| if all == 0 { 1.0 } else { good as f64 / all as f64 };
         let fits = |r: &&f64| r.abs() < EXPLAINED;
-        let own: Vec<f64> =
-            outline.iter().zip(&evidence.outline).filter(|(_, p)| p.kind == OutlineKind::Own).map(|(r, _)| *r).collect();
+        let own: Vec<f64> = outline
+            .iter()
+            .zip(&evidence.outline)
+            .filter(|(_, p)| p.kind == OutlineKind::Own)
+            .map(|(r, _)| *r)
+            .collect();
         (share(points.iter().filter(fits).count(), points.len()), share(own.iter().filter(fits).count(), own.len()))
     }
 }

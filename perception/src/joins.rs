@@ -4,6 +4,7 @@
 use crate::{
     fit::{Base, Evidence, OutlineKind},
     hypotheses::{self, Context, Hypothesis, Measured},
+    scan::Tint,
     scene::Scene,
     segments::{NONE, Segments},
 };
@@ -32,25 +33,42 @@ impl Piece {
     }
 }
 
+/// How two pieces belong together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Relation {
+    /// The second is more of the first's outer surface.
+    Surface,
+    /// The second is the inside of the first.
+    Inside,
+    /// The second is no thing at all.
+    Artefact,
+}
+
 /// Joins pieces until no two belong together.
 pub(crate) fn join(scene: &Scene, segments: &mut Segments, context: Context) {
     for _ in 0..MAX_JOINS {
         let pieces = pieces(scene, segments);
-        let pair = |test: &dyn Fn(&Piece, &Piece) -> Option<bool>| {
-            pieces.iter().find_map(|a| {
-                pieces.iter().filter(|b| b.label != a.label).find_map(|b| test(a, b).map(|inner| (a.label, b.label, inner)))
-            })
+        let pair = |relation: Relation, test: &dyn Fn(&Piece, &Piece) -> bool| {
+            let others = |a: &Piece| pieces.iter().find(|b| b.label != a.label && test(a, b)).map(|b| b.label);
+            pieces.iter().find_map(|a| others(a).map(|b| (a.label, b, relation)))
         };
-        let found = pair(&|a, b| is_floor_of(a, b).then_some(true))
-            .or_else(|| pair(&|a, b| is_fragment_of(a, b).then_some(false)))
-            .or_else(|| pair(&|a, b| is_inside_of(scene, segments, context, a, b).then_some(true)))
-            .or_else(|| pair(&|a, b| is_other_end(scene, segments, context, a, b).then_some(false)));
-        let Some((outer, other, is_inner)) = found else { return };
-        for (label, inner) in segments.labels.iter_mut().zip(&mut segments.inner).filter(|(l, _)| **l == other) {
-            *label = outer;
-            *inner |= is_inner;
+        let found = pair(Relation::Artefact, &is_ramp_of)
+            .or_else(|| pair(Relation::Inside, &is_floor_of))
+            .or_else(|| pair(Relation::Surface, &|a, b| is_fragment_of(scene, a, b)))
+            .or_else(|| pair(Relation::Inside, &|a, b| is_inside_of(scene, segments, context, a, b)))
+            .or_else(|| pair(Relation::Surface, &|a, b| is_other_end(scene, segments, context, a, b)));
+        let Some((first, second, relation)) = found else { return };
+        for (label, inner) in segments.labels.iter_mut().zip(&mut segments.inner).filter(|(l, _)| **l == second) {
+            *label = if relation == Relation::Artefact { NONE } else { first };
+            *inner |= relation == Relation::Inside;
         }
     }
+}
+
+/// Whether `ramp` is the smooth rise that a depth camera draws at the foot of `whole`.
+fn is_ramp_of(whole: &Piece, ramp: &Piece) -> bool {
+    let touches = ramp.evidence.border_share(whole.label, &[OutlineKind::Contact, OutlineKind::Cut]);
+    touches > 0.2 && ramp.top_m < 0.014_f64.min(0.3 * whole.top_m) && ramp.pixels.len() * 10 < whole.pixels.len()
 }
 
 fn pieces(scene: &Scene, segments: &Segments) -> Vec<Piece> {
@@ -71,25 +89,28 @@ fn is_floor_of(outer: &Piece, floor: &Piece) -> bool {
     bordered > 0.6 && floor.top_m < outer.top_m + 0.005 && floor.pixels.len() < outer.pixels.len()
 }
 
-/// Whether `small` is a rim, handle or the like of `whole`: it touches it, neither reaches the plane nor rises above
-/// the whole, and so can stand on nothing else.
-fn is_fragment_of(whole: &Piece, small: &Piece) -> bool {
+/// Whether `small` is a rim, handle or the like of `whole`: it touches it and does not rise above it, and either does
+/// not reach the plane, so that it can stand on nothing else, or is a scrap of the same colour.
+fn is_fragment_of(scene: &Scene, whole: &Piece, small: &Piece) -> bool {
     let touches = small.evidence.border_share(whole.label, &[OutlineKind::Contact]);
-    touches > 0.15
-        && small.pixels.len() * 3 < whole.pixels.len()
-        && small.lowest_m > 0.022
-        && small.top_m < whole.top_m + 0.005
+    if touches < 0.12 || small.pixels.len() * 3 > whole.pixels.len() || small.top_m > whole.top_m + 0.005 {
+        return false;
+    }
+    let tint = |piece: &Piece| Tint::of(&scene.scan.appearance(&piece.pixels).mean);
+    let is_scrap = || small.pixels.len() * 8 < whole.pixels.len() && tint(small).distance(&tint(whole)) < 7.0;
+    small.lowest_m > 0.022 || is_scrap()
 }
 
 /// Whether `inner` is the inside of a hollow thing whose outside is `outer`: partly covered by it, its rim level
 /// with the outer's, without a top face, and within the solid that fits the common outline.
 fn is_inside_of(scene: &Scene, segments: &Segments, context: Context, outer: &Piece, inner: &Piece) -> bool {
     let covered = inner.evidence.border_share(outer.label, &[OutlineKind::Cut, OutlineKind::Contact]);
-    if covered < 0.2 || (outer.top_m - inner.top_m).abs() > LEVEL_M || inner.top_share() > 0.4 || outer.lowest_m > 0.04 {
+    if covered < 0.1 || (outer.top_m - inner.top_m).abs() > LEVEL_M || inner.top_share() > 0.4 || outer.lowest_m > 0.08
+    {
         return false;
     }
     let joint = union(scene, segments, outer, inner, true);
-    let Some(best) = fit(context, &joint, outer.lowest_m) else { return false };
+    let Some(best) = fit(context, &joint, outer.lowest_m.min(inner.lowest_m)) else { return false };
     let (_, on_outline) = best.explained(&joint);
     let solids = best.model.solids(&best.minimum.state);
     let depth: Vec<f64> = inner.evidence.points.iter().map(|p| outside_m(&solids, p.position)).collect();
@@ -100,9 +121,11 @@ fn is_inside_of(scene: &Scene, segments: &Segments, context: Context, outer: &Pi
 /// Whether two pieces are the ends of one thing that a nearer one covers in the middle: one solid explains both
 /// better than two do.
 fn is_other_end(scene: &Scene, segments: &Segments, context: Context, a: &Piece, b: &Piece) -> bool {
-    let cut_by = |piece: &Piece, label: u32| label != NONE && piece.evidence.border_share(label, &[OutlineKind::Cut]) > 0.08;
+    let cut_by =
+        |piece: &Piece, label: u32| label != NONE && piece.evidence.border_share(label, &[OutlineKind::Cut]) > 0.08;
     let occluded_alike = a.evidence.outline.iter().any(|p| cut_by(a, p.beyond) && cut_by(b, p.beyond));
-    if a.label > b.label || !occluded_alike || (a.top_m - b.top_m).abs() > LEVEL_M || a.lowest_m.max(b.lowest_m) > 0.03 {
+    if a.label > b.label || !occluded_alike || (a.top_m - b.top_m).abs() > LEVEL_M || a.lowest_m.min(b.lowest_m) > 0.03
+    {
         return false;
     }
     let joint = union(scene, segments, a, b, false);

@@ -3,6 +3,7 @@
 use crate::{
     fit::{Evidence, OutlineKind, OutlinePoint},
     measure::{self, Rectangle},
+    scan::Tint,
     scene::Scene,
     segments::NONE,
 };
@@ -18,6 +19,9 @@ pub(crate) struct Patch {
     /// Share of its rectangle's visible area that has its colour, 0-1.
     pub fill: f64,
 }
+
+/// Tints of one patch differ by less than this.
+const ALIKE: f32 = 14.0;
 
 /// How a pixel counts in the search for patches.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,7 +41,7 @@ pub(crate) fn find(scene: &Scene, standing: &[bool]) -> Vec<Patch> {
     let tinted: Vec<bool> = ground.iter().map(|g| *g == Ground::Tinted).collect();
     let firm = scene.grid.dilate(&scene.grid.erode(&tinted, 1), 1);
     let mask: Vec<bool> = (0..tinted.len()).map(|i| tinted[i] && firm[i]).collect();
-    let alike = |a: usize, b: usize| tint_distance(scene.scan.tint(a), scene.scan.tint(b)) < 14.0;
+    let alike = |a: usize, b: usize| scene.scan.tint(a).distance(&scene.scan.tint(b)) < ALIKE;
     let (labels, sizes) = scene.grid.components(&mask, alike);
     let mut pieces: Vec<Vec<usize>> = vec![Vec::new(); sizes.len()];
     for (index, &label) in labels.iter().enumerate() {
@@ -50,16 +54,12 @@ pub(crate) fn find(scene: &Scene, standing: &[bool]) -> Vec<Patch> {
     pieces.into_iter().filter_map(|pixels| patch(scene, &ground, pixels)).collect()
 }
 
-fn tint_distance(a: [f32; 2], b: [f32; 2]) -> f32 {
-    (a[0] - b[0]).hypot(a[1] - b[1])
-}
-
 fn classify(scene: &Scene, surface: &SurfaceTint, covered: &[bool], index: usize) -> Ground {
     let dark = scene.scan.lab[index][0] < 8.0;
     if covered[index] || scene.own[index] || !scene.in_plane[index] || dark {
         return Ground::Unknown;
     }
-    let distance = tint_distance(scene.scan.tint(index), surface.at(scene, index));
+    let distance = scene.scan.tint(index).distance(&surface.at(scene, index));
     if distance > scene.config.patch_contrast { Ground::Tinted } else { Ground::Bare }
 }
 
@@ -74,28 +74,28 @@ impl SurfaceTint {
         let pixels: Vec<usize> = (0..scene.grid.len()).step_by(5).filter(|&i| scene.in_plane[i]).collect();
         let mode = mode(&pixels.iter().map(|&i| scene.scan.tint(i)).collect::<Vec<_>>())?;
         let constant = |value: f32| nalgebra::Vector3::new(value, 0.0, 0.0);
-        let mut tint = SurfaceTint { coefficients: [constant(mode[0]), constant(mode[1])] };
+        let mut tint = SurfaceTint { coefficients: [constant(mode.a), constant(mode.b)] };
         for _ in 0..3 {
             let (mut matrix, mut right) = (nalgebra::Matrix3::zeros(), [nalgebra::Vector3::zeros(); 2]);
             for &pixel in &pixels {
                 let value = scene.scan.tint(pixel);
-                if tint_distance(value, tint.at(scene, pixel)) > 0.6 * scene.config.patch_contrast {
+                if value.distance(&tint.at(scene, pixel)) > 0.6 * scene.config.patch_contrast {
                     continue;
                 }
                 let row = place(scene, pixel);
                 matrix += row * row.transpose();
-                right[0] += row * value[0];
-                right[1] += row * value[1];
+                right[0] += row * value.a;
+                right[1] += row * value.b;
             }
             let inverse = (matrix + nalgebra::Matrix3::identity() * 10.0).try_inverse()?;
             let pull = |c: f32, sum| inverse * (sum + constant(10.0 * c));
-            tint.coefficients = [pull(mode[0], right[0]), pull(mode[1], right[1])];
+            tint.coefficients = [pull(mode.a, right[0]), pull(mode.b, right[1])];
         }
         Some(tint)
     }
-    fn at(&self, scene: &Scene, pixel: usize) -> [f32; 2] {
+    fn at(&self, scene: &Scene, pixel: usize) -> Tint {
         let row = place(scene, pixel);
-        [self.coefficients[0].dot(&row), self.coefficients[1].dot(&row)]
+        Tint { a: self.coefficients[0].dot(&row), b: self.coefficients[1].dot(&row) }
     }
 }
 
@@ -106,20 +106,26 @@ fn place(scene: &Scene, pixel: usize) -> nalgebra::Vector3<f32> {
 }
 
 /// The most frequent tint: the fullest cell of a histogram, refined by the mean round it.
-fn mode(tints: &[[f32; 2]]) -> Option<[f32; 2]> {
+fn mode(tints: &[Tint]) -> Option<Tint> {
     const CELL: f32 = 4.0;
     const HALF: i32 = 40;
     let cell = |value: f32| (value / CELL).round().clamp(-HALF as f32, HALF as f32) as i32 + HALF;
     let side = 2 * HALF as usize + 1;
     let mut counts = vec![0u32; side * side];
     for tint in tints {
-        counts[cell(tint[0]) as usize * side + cell(tint[1]) as usize] += 1;
+        counts[cell(tint.a) as usize * side + cell(tint.b) as usize] += 1;
     }
     let fullest = (0..counts.len()).max_by_key(|&i| (counts[i], std::cmp::Reverse(i)))?;
-    let middle = [(fullest / side) as f32, (fullest % side) as f32].map(|at| (at - HALF as f32) * CELL);
-    let near: Vec<&[f32; 2]> = tints.iter().filter(|t| tint_distance(**t, middle) < 2.0 * CELL).collect();
-    let count = near.len() as f32;
-    (count > 0.0).then(|| [0, 1].map(|axis| near.iter().map(|t| t[axis]).sum::<f32>() / count))
+    let middle = |at: usize| (at as f32 - HALF as f32) * CELL;
+    let middle = Tint { a: middle(fullest / side), b: middle(fullest % side) };
+    mean(tints.iter().copied().filter(|tint| tint.distance(&middle) < 2.0 * CELL))
+}
+
+fn mean(tints: impl Iterator<Item = Tint>) -> Option<Tint> {
+    let (sum, count) = tints.fold((Tint { a: 0.0, b: 0.0 }, 0.0f32), |(sum, count), tint| {
+        (Tint { a: sum.a + tint.a, b: sum.b + tint.b }, count + 1.0)
+    });
+    (count > 0.0).then(|| Tint { a: sum.a / count, b: sum.b / count })
 }
 
 /// Where the rays of some of the pixels meet the plane.
@@ -136,15 +142,13 @@ fn rectangle(plan: &[DVec2]) -> Option<Rectangle> {
 /// Joins pieces of one patch that something standing on it, or the robot, cuts apart: pieces of one colour whose
 /// common rectangle is as full as their own.
 fn join_pieces(scene: &Scene, ground: &[Ground], pieces: &mut Vec<Vec<usize>>) {
-    let mean_tint = |pixels: &[usize]| {
-        let sum = pixels.iter().map(|&i| scene.scan.tint(i)).fold([0.0f32; 2], |s, t| [s[0] + t[0], s[1] + t[1]]);
-        sum.map(|total| total / pixels.len() as f32)
-    };
+    let mean_tint = |pixels: &[usize]| mean(pixels.iter().map(|&i| scene.scan.tint(i)));
     let mut first = 0;
     while first < pieces.len() {
         let mut second = first + 1;
         while second < pieces.len() {
-            let alike = tint_distance(mean_tint(&pieces[first]), mean_tint(&pieces[second])) < 14.0;
+            let tints = mean_tint(&pieces[first]).zip(mean_tint(&pieces[second]));
+            let alike = tints.is_some_and(|(a, b)| a.distance(&b) < ALIKE);
             let joined: Vec<usize> = if alike {
                 let mut both: Vec<usize> = pieces[first].iter().chain(&pieces[second]).copied().collect();
                 both.sort_unstable();
@@ -228,7 +232,12 @@ fn outline(scene: &Scene, ground: &[Ground], pixels: &[usize]) -> Vec<OutlinePoi
                 Some(Ground::Unknown) | None => OutlineKind::Cut,
             };
             let at = DVec2::new(scene.grid.column(pixel) as f64, scene.grid.row(pixel) as f64);
-            points.push(OutlinePoint { pixel: at + DVec2::new(dx as f64, dy as f64) * 0.5, sigma_px: 1.0, kind, beyond: NONE });
+            points.push(OutlinePoint {
+                pixel: at + DVec2::new(dx as f64, dy as f64) * 0.5,
+                sigma_px: 1.0,
+                kind,
+                beyond: NONE,
+            });
         }
     }
     points

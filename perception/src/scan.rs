@@ -23,6 +23,26 @@ pub(crate) struct Scan {
     pub depth_fraction: f64,
 }
 
+/// Colour with the strength of the light taken out: a and b over L + 16, which all scale with the cube root of the
+/// illumination, times 80 so that the numbers compare with CIELAB's at medium lightness.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Tint {
+    pub a: f32,
+    pub b: f32,
+}
+
+impl Tint {
+    pub fn new(l: f32, a: f32, b: f32) -> Tint {
+        Tint { a: 80.0 * a / (l + 16.0), b: 80.0 * b / (l + 16.0) }
+    }
+    pub fn of(lab: &Lab) -> Tint {
+        Tint::new(lab.l as f32, lab.a as f32, lab.b as f32)
+    }
+    pub fn distance(&self, other: &Tint) -> f32 {
+        (self.a - other.a).hypot(self.b - other.b)
+    }
+}
+
 impl Scan {
     /// Reads a frame, or says why it shows nothing.
     pub fn read(frame: &RgbdFrame, config: &GrounderConfig) -> Result<Scan, (Blindness, f64)> {
@@ -55,11 +75,10 @@ impl Scan {
     pub fn ray(&self, index: usize) -> DVec3 {
         self.intrinsics.ray(self.grid.column(index) as f64, self.grid.row(index) as f64)
     }
-    /// Colour with the strength of the light taken out: a and b over L + 16, which all scale with the cube root of
-    /// the illumination, times 80 so that the numbers compare with CIELAB's at medium lightness.
-    pub fn tint(&self, index: usize) -> [f32; 2] {
+    /// The tint of a pixel.
+    pub fn tint(&self, index: usize) -> Tint {
         let [l, a, b] = self.lab[index];
-        [80.0 * a / (l + 16.0), 80.0 * b / (l + 16.0)]
+        Tint::new(l, a, b)
     }
     /// Mean colour and spread of some pixels.
     pub fn appearance(&self, pixels: &[usize]) -> Appearance {
@@ -175,10 +194,10 @@ mod tests {
         // Linear light halved: sRGB 180 -> 132, 90 -> 64, 60 -> 41.
         let tint = |rgb| {
             let [l, a, b] = to_lab(rgb);
-            [80.0 * a / (l + 16.0), 80.0 * b / (l + 16.0)]
+            Tint::new(l, a, b)
         };
         let (full, half) = (tint([180, 90, 60]), tint([132, 64, 41]));
-        assert!((full[0] - half[0]).hypot(full[1] - half[1]) < 1.5, "{full:?} {half:?}");
+        assert!(full.distance(&half) < 1.5, "{full:?} {half:?}");
     }
 
     #[test]

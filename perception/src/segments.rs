@@ -220,12 +220,7 @@ fn merge_smooth(scene: &Scene, normals: &[Vec3], segments: &mut Segments) {
 }
 
 /// For every pair of segments that touch in the image: border pixels that run on smoothly, and all of them.
-fn borders(
-    grid: Grid,
-    scene: &Scene,
-    normals: &[Vec3],
-    segments: &Segments,
-) -> BTreeMap<(u32, u32), (usize, usize)> {
+fn borders(grid: Grid, scene: &Scene, normals: &[Vec3], segments: &Segments) -> BTreeMap<(u32, u32), (usize, usize)> {
     let mut borders = BTreeMap::new();
     let reach = BEND_STEP as isize + 1;
     for index in 0..grid.len() {
@@ -268,7 +263,7 @@ fn drop_small(scene: &Scene, segments: &mut Segments) {
         let mut heights: Vec<f32> = list.iter().map(|&i| scene.point[i].z / scene.height_limit_m(i)).collect();
         heights.sort_by(f32::total_cmp);
         // A thing reaches clearly above the limit; a ripple of the plane only just passes it.
-        heights[heights.len() * 9 / 10] > 1.35
+        heights[heights.len() * 9 / 10] > 1.7
     };
     let kept: Vec<bool> = pixels.iter().map(is_thing).collect();
     segments.keep(&kept);

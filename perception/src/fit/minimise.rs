@@ -45,9 +45,9 @@ impl Share {
 /// Moves a rough start near to a minimum, with wide standard deviations.
 pub(crate) fn approach(model: &Model, evidence: &Evidence, start: &[f64]) -> Vec<f64> {
     let problem = Problem { model, evidence, start, frozen: None };
-    APPROACH.iter().fold(start.to_vec(), |state, (widening, steps)| {
-        problem.descend(state, *widening, *steps, Share::Fitted)
-    })
+    APPROACH
+        .iter()
+        .fold(start.to_vec(), |state, (widening, steps)| problem.descend(state, *widening, *steps, Share::Fitted))
 }
 
 /// Fits a model from `start`, which [`approach`] has brought near. The start is kept where the fitted state does not

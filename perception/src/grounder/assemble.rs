@@ -45,8 +45,7 @@ pub(super) fn object(
         categories,
         parts: vec![part],
         appearance,
-        confidence: (certainty * explained * (1.0 - (-(pixels.len() as f64) / 150.0).exp()))
-            .clamp(0.0, 1.0),
+        confidence: (certainty * explained * (1.0 - (-(pixels.len() as f64) / 150.0).exp())).clamp(0.0, 1.0),
         truncated: evidence.cut_share() > CUT_SHARE,
         expected: None,
         support,

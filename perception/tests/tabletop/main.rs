@@ -49,7 +49,15 @@ fn summary(percepts: &Percepts) -> String {
         let t = p.pose.pose.translation;
         format!(
             "  {} {} {:?} at {:.0},{:.0},{:.0} yaw {:.1} conf {:.2} px {}",
-            o.category, p.template, values, t.x * 1e3, t.y * 1e3, t.z * 1e3, p.pose.pose.yaw().to_degrees(), o.confidence, o.support.count
+            o.category,
+            p.template,
+            values,
+            t.x * 1e3,
+            t.y * 1e3,
+            t.z * 1e3,
+            p.pose.pose.yaw().to_degrees(),
+            o.confidence,
+            o.support.count
         )
     };
     percepts.objects.iter().map(line).collect::<Vec<_>>().join("\n")
