@@ -57,7 +57,7 @@ pub fn run(args: &PerceiveArgs) -> anyhow::Result<Exit> {
 
 /// Without a camera pose the world is the surface's: z = 0 on the plane, x to the camera's right.
 fn level(mut frame: RgbdFrame) -> RgbdFrame {
-    if let Some(pose) = acm_perception::level(&frame) {
+    if let Some(pose) = acm_perception::level(&frame, &GrounderConfig::default()) {
         frame.header.camera_pose = pose;
     }
     frame

@@ -37,8 +37,10 @@ fn preview(file: &str, seed: u64, out: &Path, info: bool) -> anyhow::Result<()> 
     let renderer = Arc::new(Mutex::new(acm_render::Renderer::new()?));
     let options = SimOptions { seed, motion: true, ..SimOptions::default() };
     let simulation = Simulation::new(&scenario, &options, renderer)?;
-    let image = simulation.preview()?;
-    image.save(out).with_context(|| format!("the picture {} cannot be written", out.display()))?;
+    simulation
+        .preview(None)?
+        .color
+        .save(out).with_context(|| format!("the picture {} cannot be written", out.display()))?;
     println!("{} seed {seed} -> {}", scenario.name(), out.display());
     if info {
         for object in simulation.truth() {

@@ -19,7 +19,7 @@ use acm_runtime::{
     core::{Core, CoreError, Outbox},
     envelope::{Envelope, OUTSIDE},
 };
-pub use state::WipeAt;
+pub use state::{ParseEventError, WipeAt};
 use state::{Doing, Pending};
 
 /// How many frames may be taken to decide one verification.

@@ -1,6 +1,7 @@
 //! The devices that a renderer can run on.
 
 use serde::Serialize;
+use std::fmt;
 use wgpu::{Backend, Backends, DeviceType};
 
 /// A device that can render, as `acm doctor` prints it.
@@ -14,6 +15,13 @@ pub struct AdapterReport {
     pub driver: String,
     /// Whether the processor does the drawing.
     pub is_software: bool,
+}
+
+impl fmt::Display for AdapterReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let on = if self.is_software { "on the processor" } else { "on a graphics card" };
+        write!(f, "{} by {} ({on})", self.name, self.backend)
+    }
 }
 
 /// The devices of this machine, in the order in which a renderer tries them. Empty if no driver is installed.

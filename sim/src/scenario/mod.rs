@@ -156,6 +156,10 @@ impl Scenario {
     pub fn summary(&self) -> &str {
         &self.summary
     }
+    /// The sensor profile of the first camera.
+    pub fn sensor(&self) -> &str {
+        self.world.cameras.first().map_or("none", |camera| camera.sensor.as_str())
+    }
     /// Other wordings of the instruction.
     pub fn paraphrases(&self) -> &[String] {
         &self.paraphrases
