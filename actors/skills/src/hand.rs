@@ -86,6 +86,10 @@ impl Hand {
         let (low, high) = (self.robot.workspace_min.z, self.robot.workspace_max.z);
         self.command.tcp.translation.z = height_m.max(low).min(high);
     }
+    /// The force with which things are held, newtons.
+    pub fn full_grip_n(&self) -> f64 {
+        GRIP_FORCE_N.min(self.robot.max_grip_force_n)
+    }
     /// How many ticks at least fill a time.
     pub fn ticks(&self, seconds: f64) -> u32 {
         (seconds / self.robot.tick_s).ceil().clamp(1.0, 1e6) as u32

@@ -1,4 +1,4 @@
-//! Straight motions of the TCP under limits: minimum-jerk legs between waypoints.
+//! Straight motions of the TCP under limits of speed and acceleration, at rest at every waypoint.
 
 use acm_concept::{embodiment::RobotDescription, pose::Pose};
 use glam::DVec3;
@@ -8,9 +8,6 @@ use std::collections::VecDeque;
 const MAX_LEG_TICKS: f64 = 3000.0;
 /// Legs shorter than this are left out, metres and radians.
 const NEGLIGIBLE: f64 = 1e-5;
-/// Peak speed and peak acceleration of the minimum-jerk law 10 s^3 - 15 s^4 + 6 s^5 over unit time and distance.
-const PEAK_SPEED: f64 = 1.875;
-const PEAK_ACCELERATION: f64 = 5.774;
 
 /// How fast a motion may be.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,16 +43,35 @@ impl Pace {
         let free = Pace::free(robot);
         Pace { speed_m_s: free.speed_m_s.min(0.12), acceleration_m_s2: 0.8, ..free }
     }
-    /// Shortest time in which a leg keeps all four limits, seconds.
-    fn duration_s(&self, distance_m: f64, angle_rad: f64) -> f64 {
-        let bound = |amount: f64, speed: f64, acceleration: f64| {
-            (PEAK_SPEED * amount / speed).max((PEAK_ACCELERATION * amount / acceleration).sqrt())
-        };
-        bound(distance_m, self.speed_m_s, self.acceleration_m_s2).max(bound(
-            angle_rad,
-            self.turn_rad_s,
-            self.turn_acceleration_rad_s2,
-        ))
+}
+
+/// The time law of a leg over its unit length: even acceleration, even speed, even deceleration.
+#[derive(Debug, Clone, Copy)]
+struct Trapezoid {
+    speed: f64,
+    ramp_s: f64,
+    duration_s: f64,
+}
+
+impl Trapezoid {
+    /// The fastest that keeps all four limits of a pace.
+    fn new(pace: &Pace, distance_m: f64, angle_rad: f64) -> Trapezoid {
+        let fastest = |shift: f64, turn: f64| (shift / distance_m.max(1e-12)).min(turn / angle_rad.max(1e-12));
+        let acceleration = fastest(pace.acceleration_m_s2, pace.turn_acceleration_rad_s2);
+        let speed = fastest(pace.speed_m_s, pace.turn_rad_s).min(acceleration.sqrt());
+        let ramp_s = speed / acceleration;
+        Trapezoid { speed, ramp_s, duration_s: 1.0 / speed + ramp_s }
+    }
+    /// The share of the leg that is behind after a share of its duration.
+    fn fraction(&self, share: f64) -> f64 {
+        let (gone_s, left_s) = (share * self.duration_s, (1.0 - share) * self.duration_s);
+        if gone_s < self.ramp_s {
+            0.5 * self.speed * gone_s * gone_s / self.ramp_s
+        } else if left_s < self.ramp_s {
+            1.0 - 0.5 * self.speed * left_s * left_s / self.ramp_s
+        } else {
+            self.speed * (gone_s - 0.5 * self.ramp_s)
+        }
     }
 }
 
@@ -63,6 +79,7 @@ impl Pace {
 struct Leg {
     from: Pose,
     to: Pose,
+    law: Trapezoid,
     ticks: u32,
 }
 
@@ -86,8 +103,10 @@ impl Path {
             if distance_m < NEGLIGIBLE && angle_rad < NEGLIGIBLE {
                 continue;
             }
-            let ticks = (pace.duration_s(distance_m, angle_rad) / tick_s).ceil().clamp(1.0, MAX_LEG_TICKS) as u32;
-            legs.push_back(Leg { from: at, to, ticks });
+            let law = Trapezoid::new(&pace, distance_m, angle_rad);
+            // Rounded up to whole ticks; the law is stretched over them.
+            let ticks = (law.duration_s / tick_s).ceil().clamp(1.0, MAX_LEG_TICKS) as u32;
+            legs.push_back(Leg { from: at, to, law, ticks });
             ticks_in_all += ticks;
             at = to;
         }
@@ -116,8 +135,8 @@ impl Path {
             self.done_ticks = 0;
             return Some(to);
         }
-        let s = f64::from(self.done_ticks) / f64::from(leg.ticks);
-        Some(leg.from.interpolate(&leg.to, s * s * s * (10.0 - 15.0 * s + 6.0 * s * s)))
+        let share = f64::from(self.done_ticks) / f64::from(leg.ticks);
+        Some(leg.from.interpolate(&leg.to, leg.law.fraction(share)))
     }
     /// Begins anew from a pose at rest, through the waypoints that are left.
     pub fn restart(&mut self, from: Pose) {
@@ -157,7 +176,7 @@ mod tests {
                 let step = next.translation - at.translation;
                 prop_assert!(step.length() <= PACE.speed_m_s * TICK_S * 1.0001);
                 // At a waypoint two ends of legs meet; each alone keeps the bound.
-                prop_assert!((step - speed).length() <= 2.0 * PACE.acceleration_m_s2 * TICK_S * TICK_S);
+                prop_assert!((step - speed).length() <= 2.0001 * PACE.acceleration_m_s2 * TICK_S * TICK_S);
                 prop_assert!(at.angle_to(&next) <= PACE.turn_rad_s * TICK_S * 1.0001);
                 let level = step.truncate().length() > 1e-9;
                 prop_assert!(!level || next.translation.z >= height - 1e-9);

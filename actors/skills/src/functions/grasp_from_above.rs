@@ -53,8 +53,16 @@ enum Stage {
     Begin,
     Reaching,
     Grasping { empty_n: f64 },
-    Tugging { empty_n: f64, gap_m: f64, base_in_tcp: Pose },
-    Lifting { empty_n: f64, gap_m: f64, base_in_tcp: Pose },
+    Tugging { empty_n: f64, grip: HeldGrip },
+    Lifting { empty_n: f64, grip: HeldGrip },
+}
+
+/// What the grasp left in the hand.
+#[derive(Debug, Clone, Copy)]
+struct HeldGrip {
+    width_m: f64,
+    gap_m: f64,
+    base_in_tcp: Pose,
 }
 
 /// The running function.
@@ -131,11 +139,11 @@ impl GraspFromAbove {
     }
 
     fn tug(&mut self, hand: &Hand, empty_n: f64, outcome: Outcome, notes: &mut Notes) -> Option<Next> {
-        let Outcome::Grasped { gap_m, tcp, touched } = outcome else { return None };
-        notes.measure("grip_width_m", gap_m);
+        let Outcome::Grasped { width_m, gap_m, tcp, touched } = outcome else { return None };
+        notes.measure("grip_width_m", width_m);
         notes.measure("grip_height_m", tcp.translation.z);
         notes.measure("fingers_touched", f64::from(u8::from(touched)));
-        self.stage = Stage::Tugging { empty_n, gap_m, base_in_tcp: self.base_in_tcp(&tcp) };
+        self.stage = Stage::Tugging { empty_n, grip: HeldGrip { width_m, gap_m, base_in_tcp: self.base_in_tcp(&tcp) } };
         let height_m = within_ceiling(hand, hand.command.tcp.translation.z + TUG_M);
         let path = Path::vertical(hand.command.tcp, height_m, Pace::gentle(&hand.robot), hand.robot.tick_s);
         Some(Next::Begin(Box::new(Carry::new(path, GripWatch::new(gap_m)))))
@@ -153,19 +161,19 @@ impl Function for GraspFromAbove {
             (Stage::Grasping { empty_n }, Some(outcome)) => {
                 self.tug(hand, empty_n, outcome, notes).unwrap_or_else(unexpected)
             }
-            (Stage::Tugging { empty_n, gap_m, base_in_tcp }, _) => {
-                notes.measure("tug_gap_change_m", (feedback.opening_m - gap_m).abs());
-                self.stage = Stage::Lifting { empty_n, gap_m, base_in_tcp };
+            (Stage::Tugging { empty_n, grip }, _) => {
+                notes.measure("tug_gap_change_m", (feedback.opening_m - grip.gap_m).abs());
+                self.stage = Stage::Lifting { empty_n, grip };
                 let height_m = self.carry_height_m.max(hand.command.tcp.translation.z);
                 let path = Path::vertical(hand.command.tcp, height_m, Pace::carrying(&hand.robot), hand.robot.tick_s);
-                Next::Begin(Box::new(Carry::new(path, GripWatch::new(gap_m))))
+                Next::Begin(Box::new(Carry::new(path, GripWatch::new(grip.gap_m))))
             }
-            (Stage::Lifting { empty_n, gap_m, base_in_tcp }, _) => {
+            (Stage::Lifting { empty_n, grip }, _) => {
                 notes.measure("held_weight_n", empty_n - hand.baseline_n().z);
-                let slipped = (feedback.opening_m - gap_m).abs() > SLIP_M;
-                let fit = holding_confidence(gap_m, self.approach.width_m);
+                let slipped = (feedback.opening_m - grip.gap_m).abs() > SLIP_M;
+                let fit = holding_confidence(grip.width_m, self.approach.width_m);
                 let confidence = if slipped { fit.min(SLIPPED_CONFIDENCE) } else { fit };
-                notes.feel_held(self.object, base_in_tcp, confidence);
+                notes.feel_held(self.object, grip.base_in_tcp, confidence);
                 Next::Done
             }
             (Stage::Grasping { .. }, None) => unexpected(),
@@ -234,9 +242,9 @@ fn choose_approach(
     }
 }
 
-/// How sure the fingers are of holding the part: the better the gap fits the perceived width, the surer.
-fn holding_confidence(gap_m: f64, width_m: f64) -> f64 {
-    let off_m = (gap_m - width_m).abs();
+/// How sure the fingers are of holding the part: the better the felt width fits the perceived one, the surer.
+fn holding_confidence(felt_m: f64, width_m: f64) -> f64 {
+    let off_m = (felt_m - width_m).abs();
     if off_m <= 0.004 {
         0.97
     } else if off_m <= 0.008 {

@@ -10,7 +10,7 @@ use crate::{
     clearance::{GUARD_M, SAFETY_M, approach_clearance, obstacles, safe_height, within_guarded_reach, within_reach},
     controller::StartError,
     geometry::{downward, points_down},
-    hand::{Hand, holds_something},
+    hand::{Hand, holds_something, pads_in_contact},
     motion::{Pace, Path},
     primitives::{Carry, Failure, GripWatch, Lower, Outcome, Reach, Release},
     run::{Function, Next, Notes},
@@ -132,7 +132,6 @@ impl PlaceUpright {
     fn rise(&mut self, hand: &Hand, feedback: &Feedback, notes: &mut Notes) -> Next {
         notes.left_at = Some(feedback.tcp * self.base_in_tcp);
         notes.measure("release_height_m", feedback.tcp.translation.z);
-        notes.feel_empty(self.object);
         if self.room(hand, hand.robot.max_opening_m) >= OPENING_ROOM_M {
             self.opening_m = hand.robot.max_opening_m;
         }
@@ -142,7 +141,13 @@ impl PlaceUpright {
         Next::Begin(Box::new(Reach::passing(path, self.opening_m)))
     }
 
-    fn leave(&mut self, hand: &Hand) -> Next {
+    fn leave(&mut self, hand: &Hand, feedback: &Feedback, notes: &mut Notes) -> Next {
+        if pads_in_contact(feedback) != [false, false] {
+            let what = "the fingers are open and the hand has risen, but a pad still feels something: gap";
+            let reason = format!("{what} {:.1} mm", 1e3 * feedback.opening_m);
+            return Next::Failed(Failure::new(FailureCause::Place, reason));
+        }
+        notes.feel_empty(self.object);
         self.stage = Stage::Leaving;
         let height_m = self.leave_height_m.max(hand.command.tcp.translation.z);
         let path = Path::vertical(hand.command.tcp, height_m, Pace::free(&hand.robot), hand.robot.tick_s);
@@ -166,8 +171,13 @@ impl Function for PlaceUpright {
                 Next::Begin(Box::new(Lower::new(hand, floor_m, GripWatch::new(self.gap_m))))
             }
             Stage::Lowering => self.release(hand, last, notes),
-            Stage::Releasing => self.rise(hand, feedback, notes),
-            Stage::Rising => self.leave(hand),
+            Stage::Releasing => {
+                if let Some(Outcome::Released { free }) = last {
+                    notes.measure("pads_free", f64::from(u8::from(free)));
+                }
+                self.rise(hand, feedback, notes)
+            }
+            Stage::Rising => self.leave(hand, feedback, notes),
             Stage::Leaving if self.opening_m < hand.robot.max_opening_m => self.open(hand),
             Stage::Leaving | Stage::Opening => Next::Done,
         }

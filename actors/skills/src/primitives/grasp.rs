@@ -17,6 +17,8 @@ const TOUCH_N: f64 = 4.0;
 const LIFT_OFF_M: f64 = 0.003;
 /// Speed at which the commanded opening closes, m/s: an object off the middle is shoved, not knocked.
 const CLOSING_M_S: f64 = 0.12;
+/// Force of closing, newtons: the width is measured before the full force dents pads or part.
+const CLOSING_N: f64 = 6.0;
 /// How long the gap must stay the same, seconds, and within what, metres.
 const STALL_S: f64 = 0.05;
 const STALL_M: f64 = 0.0004;
@@ -24,6 +26,8 @@ const STALL_M: f64 = 0.0004;
 const NARROWER_M: f64 = 0.012;
 /// A gap wider than the perceived width by more than this is jammed; metres.
 const WIDER_M: f64 = 0.02;
+/// Fingers commanded at least this much narrower than they are push, metres.
+const PUSHING_M: f64 = 0.003;
 /// How long one pad may wait for the other, seconds.
 const ONE_SIDED_S: f64 = 0.3;
 /// What closing may take, seconds.
@@ -44,12 +48,36 @@ pub(crate) struct GraspPlan {
 enum Phase {
     Lower(Descent),
     LiftOff(Path),
+    /// Gently, until the gap stalls.
     Close {
-        gaps: VecDeque<f64>,
+        gaps: Stall,
         one_sided_ticks: u32,
+    },
+    /// At full force around something of this width, until the gap stalls again.
+    Squeeze {
+        gaps: Stall,
+        width_m: f64,
     },
     /// What was gripped is not the part as it should be: it is let go where it stands, and then the grasp fails.
     LetGo(Failure),
+}
+
+/// The last gaps, over the time in which they must not change.
+#[derive(Debug, Default)]
+struct Stall {
+    gaps: VecDeque<f64>,
+}
+
+impl Stall {
+    /// Takes a new gap; true once the gap has stopped changing.
+    fn reached(&mut self, hand: &Hand, gap_m: f64) -> bool {
+        let count = hand.ticks(STALL_S) as usize + 1;
+        self.gaps.push_back(gap_m);
+        if self.gaps.len() > count {
+            self.gaps.pop_front();
+        }
+        self.gaps.len() == count && self.gaps.iter().all(|gap| (gap - gap_m).abs() < STALL_M)
+    }
 }
 
 /// From above the part, fingers open, at rest and with the wrist's zero taken, to closed on it at full force.
@@ -75,15 +103,10 @@ impl Grasp {
         if gap_m < CLOSED_M {
             return Step::Failed(nothing(format!("the fingers closed on nothing: the gap is {:.1} mm", 1e3 * gap_m)));
         }
+        hand.command.grip_force_n = CLOSING_N.min(hand.robot.max_grip_force_n);
         hand.turn_opening(0.0, CLOSING_M_S);
-        gaps.push_back(gap_m);
-        if gaps.len() > hand.ticks(STALL_S) as usize + 1 {
-            gaps.pop_front();
-        }
-        let full = gaps.len() == hand.ticks(STALL_S) as usize + 1;
-        let spread = gaps.iter().fold(0.0f64, |spread, gap| spread.max((gap - gap_m).abs()));
-        let pushing = feedback.commanded_opening_m < gap_m - LIFT_OFF_M;
-        if !(full && spread < STALL_M && pushing) {
+        let pushing = feedback.commanded_opening_m < gap_m - PUSHING_M;
+        if !(gaps.reached(hand, gap_m) && pushing) {
             return Step::Act;
         }
         if pads_in_contact(feedback) != [true, true] {
@@ -99,7 +122,9 @@ impl Grasp {
             return Step::Act;
         }
         hand.command.opening_m = 0.0;
-        Step::Done(Outcome::Grasped { gap_m, tcp: feedback.tcp, touched: self.touched })
+        hand.command.grip_force_n = hand.full_grip_n();
+        self.phase = Phase::Squeeze { gaps: Stall::default(), width_m: gap_m };
+        Step::Act
     }
 }
 
@@ -138,6 +163,16 @@ impl Primitive for Grasp {
                 None => self.phase = closing(),
             },
             Phase::Close { .. } => return self.close(hand, feedback),
+            Phase::Squeeze { gaps, width_m } => {
+                let (gap_m, width_m) = (feedback.opening_m, *width_m);
+                if gap_m < CLOSED_M {
+                    return Step::Failed(nothing("the object slipped out when it was squeezed".into()));
+                }
+                if gaps.reached(hand, gap_m) {
+                    let (tcp, touched) = (feedback.tcp, self.touched);
+                    return Step::Done(Outcome::Grasped { width_m, gap_m, tcp, touched });
+                }
+            }
             Phase::LetGo(failure) => {
                 hand.command.opening_m = hand.command.opening_m.max(feedback.opening_m.min(self.open_m));
                 if hand.turn_opening(self.open_m, CLOSING_M_S) {
@@ -150,7 +185,7 @@ impl Primitive for Grasp {
 }
 
 fn closing() -> Phase {
-    Phase::Close { gaps: VecDeque::new(), one_sided_ticks: 0 }
+    Phase::Close { gaps: Stall::default(), one_sided_ticks: 0 }
 }
 
 /// The fingers hold nothing: they closed on nothing, never closed, or let go again.

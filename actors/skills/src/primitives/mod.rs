@@ -15,7 +15,7 @@ pub(crate) use reach::Reach;
 pub(crate) use release::Release;
 
 use crate::hand::Hand;
-use acm_concept::{embodiment::Feedback, primitive::Primitive as Kind, skill::FailureCause};
+use acm_concept::{embodiment::Feedback, pose::Pose, primitive::Primitive as Kind, skill::FailureCause};
 use glam::DVec3;
 use std::collections::VecDeque;
 
@@ -57,13 +57,13 @@ pub(crate) enum Outcome {
     Arrived,
     /// What is held touched something with this force at this measured TCP height, or `None` if it never did.
     Lowered { touch_n: Option<f64>, height_m: f64 },
-    /// The fingers stopped at this gap around something, with the TCP at this height; the tips had touched
-    /// something on the way down or not.
-    Grasped { gap_m: f64, tcp: acm_concept::pose::Pose, touched: bool },
+    /// The fingers stopped around something of this width, and at this gap under full force, with the TCP there;
+    /// the tips had touched something on the way down or not.
+    Grasped { width_m: f64, gap_m: f64, tcp: Pose, touched: bool },
     /// The greatest force, and how far the hand went on after the first touch.
     Pushed { force_n: f64, travel_m: f64 },
-    /// Both pads are free.
-    Released,
+    /// The fingers are open; whether both pads are free.
+    Released { free: bool },
 }
 
 /// A check that failed.

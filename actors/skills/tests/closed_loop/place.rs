@@ -98,6 +98,21 @@ fn neighbours_keep_the_fingers_narrow_until_the_hand_is_above_them() {
     assert_eq!(world.feedback().commanded_opening_m, 0.08);
 }
 
+#[test]
+fn what_leans_on_a_pad_is_left_by_rising_and_what_sticks_is_told() {
+    let (mut world, held) = picked(0.0, 0.0);
+    let invocation = place(held, table_pose(0.0, -0.1, 0.0));
+    world.leaning_below_m = TABLE_M + 0.03;
+    let report = run(&mut world.clone(), &invocation);
+    assert_eq!((report.failure.clone(), report.measured["pads_free"]), (None, 0.0));
+    world.leaning_below_m = TABLE_M + 0.1;
+    let report = run(&mut world, &invocation);
+    let (cause, reason) = report.failure.clone().unwrap();
+    assert!(cause == FailureCause::Place && reason.contains("a pad still feels something"), "{reason}");
+    assert_eq!(felt(&report, "hand-empty()"), None, "what sticks to a pad may still hang there");
+    assert!(report.left_at.is_some());
+}
+
 trait Flipped {
     fn flipped(self) -> SkillInvocation;
 }

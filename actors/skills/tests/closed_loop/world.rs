@@ -24,6 +24,8 @@ const CONTACT_NS_M: f64 = 60.0;
 /// Speed of the gap, m/s.
 const GAP_M_S: f64 = 0.2;
 const GRAVITY: f64 = 9.81;
+/// How far pads and block give way together under the gripping force, m/N.
+const DENT_M_N: f64 = 0.0004;
 const PAD_HALF_WIDTH_M: f64 = 0.011;
 const FINGER_M: f64 = 0.012;
 const TIP_M: f64 = 0.011;
@@ -59,6 +61,8 @@ pub struct World {
     pub deepest_m: f64,
     /// An unseen wall that stops the hand at this x.
     pub wall_x: Option<f64>,
+    /// After letting go, one pad goes on reporting a force until the hand is above this height.
+    pub leaning_below_m: f64,
     /// Base of the block in the TCP frame while it is held.
     pub held: Option<Pose>,
     /// How far the block fell when it was let go, metres.
@@ -104,6 +108,7 @@ impl World {
             presses: 0,
             deepest_m: 0.0,
             wall_x: None,
+            leaning_below_m: 0.0,
             held: None,
             fell_m: 0.0,
             commands: Vec::new(),
@@ -185,7 +190,7 @@ impl World {
         let beside = tip_m < block.pose.translation.z + block.size.z - 0.002
             && center.x.abs() < 0.5 * size.x + PAD_HALF_WIDTH_M
             && (self.held.is_some() || center.y.abs() < 0.5 * self.gap_m);
-        self.gap_m = if beside { wanted.max(size.y) } else { wanted };
+        self.gap_m = if beside { wanted.max(size.y - DENT_M_N * self.command.grip_force_n) } else { wanted };
         if beside && wanted <= size.y + 1e-9 && self.held.is_none() {
             // Both pads meet it: its faces turn to them and it is held.
             let turn = wrap_angle(block.pose.yaw() - self.tcp.yaw());
@@ -291,13 +296,15 @@ impl Embodiment for World {
         let squeezed = self.held.is_some() && self.command.opening_m < self.gap_m - 0.0005;
         let pad =
             |side: f64| if squeezed { DVec3::new(0.0, side * self.command.grip_force_n, 0.0) } else { DVec3::ZERO };
+        let leans = self.held.is_none() && self.tcp.translation.z < self.leaning_below_m;
+        let second = if leans { DVec3::new(0.0, -5.0, 0.0) } else { pad(-1.0) };
         Feedback {
             time: Time(self.ticks * 20_000_000),
             tcp: self.tcp,
             joints: vec![],
             opening_m: self.gap_m,
             commanded_opening_m: self.command.opening_m,
-            pad_force_n: [pad(1.0), pad(-1.0)],
+            pad_force_n: [pad(1.0), second],
             wrist_force_n: self.wrist_n,
         }
     }
