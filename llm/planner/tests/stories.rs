@@ -284,6 +284,25 @@ fn a_stack_is_taken_apart_before_the_lower_cube_is_picked() {
 }
 
 #[test]
+fn a_tower_is_taken_down_from_its_top() {
+    let mut world = World::with_mats(4, 1);
+    let (red, mut top) = (ObjectId(5), ObjectId(5));
+    for color in [GREEN, GREY, GREEN, GREY] {
+        let at = world.spot(top);
+        top = world.cube(at, color, Some(top));
+    }
+    let mut longest = 0;
+    let end = run(&mut world, &task("Bring the red cube to the middle."), &abstain(), |_, decision| {
+        if let Decision::Act { explanation, .. } = decision {
+            longest = longest.max(explanation.plan.len());
+        }
+    });
+    assert!(matches!(end, Decision::Done { .. }), "{end:?}");
+    assert_eq!((longest, world.done_skills.len()), (10, 10));
+    assert!(world.spot(red).distance(MIDDLE) < 1e-9);
+}
+
+#[test]
 fn what_must_not_be_touched_is_left_alone_even_if_nothing_else_helps() {
     let mut world = World::with_mats(3, 0);
     let at = world.spot(ObjectId(4));
@@ -411,4 +430,33 @@ fn the_same_memory_gives_the_same_decision() {
     let task = task(PUT_BACK);
     let decide = || planner.decide(&task, &world, &situation(&world, 0), &options(OnUnknown::Guess, 9));
     assert_eq!(decide(), decide());
+}
+
+#[test]
+fn a_move_that_was_only_seen_is_enough_to_return() {
+    let mut world = World::with_mats(4, 0);
+    let cube = ObjectId(5);
+    let home = world.spot(cube);
+    let elsewhere =
+        Place { support: None, pose: Pose::from_translation(MIDDLE.extend(world::TABLE_Z)), tolerance_m: 0.03 };
+    let end = run(&mut world, &task("Return the cube to where it came from."), &abstain(), |_, _| {});
+    assert_eq!(given_up(&end).0, GiveUpCause::Memory);
+    assert!(world.done_skills.is_empty());
+
+    world.seen_moving(cube, elsewhere);
+    let end = run(&mut world, &task("Return the cube to where it came from."), &abstain(), |_, _| {});
+    assert!(matches!(end, Decision::Done { .. }), "{end:?}");
+    assert!(world.spot(cube).distance(home) < 1e-9);
+}
+
+#[test]
+fn the_own_grasp_for_a_guess_does_not_become_the_answer() {
+    let mut world = World::with_mats(4, 0);
+    let cube = ObjectId(5);
+    let home = world.spot(cube);
+    let text = task("Return the cube to where it came from.");
+    let end = run(&mut world, &text, &options(OnUnknown::Guess, 1), |_, _| {});
+    assert!(matches!(end, Decision::Done { .. }), "{end:?}");
+    assert_eq!(world.done_skills.len(), 2);
+    assert!(world.spot(cube).distance(home) > 0.05, "it did not come from where it stood");
 }

@@ -1,12 +1,13 @@
 //! From an instruction to a [`Task`].
 //!
-//! Words are cut ([`token`]), phrases and clauses are read by forms from the lexicon with bounded backtracking,
-//! the longest reading first ([`reader`], [`phrase`], [`clause`]), and references are joined ([`interpret`]).
+//! Words are cut (`token`), phrases and clauses are read by forms from the lexicon with bounded backtracking,
+//! the longest reading first (`reader`, `phrase`, `place`, `clause`), and references are joined (`interpret`).
 
 mod clause;
 mod error;
 mod interpret;
 mod phrase;
+mod place;
 mod reader;
 mod token;
 

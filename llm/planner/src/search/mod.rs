@@ -80,8 +80,17 @@ enum Condition {
 #[derive(Clone)]
 enum Item {
     Achieve(Condition),
-    Perform { function: String, object: ObjectId },
-    Apply { candidate: Box<SkillCandidate>, purpose: Option<Condition>, repairs: u32 },
+    /// The object shall stand on some free spot, chosen when it is its turn.
+    PutAside(ObjectId),
+    Perform {
+        function: String,
+        object: ObjectId,
+    },
+    Apply {
+        candidate: Box<SkillCandidate>,
+        purpose: Option<Condition>,
+        repairs: u32,
+    },
 }
 
 /// A partial plan: what is done so far, and what is open, the next on top.
@@ -173,6 +182,14 @@ impl<'v> Search<'v, '_> {
                     self.achieve(&node, &condition);
                     return None;
                 }
+                Item::PutAside(object) => {
+                    let Some(spot) = node.state.free_spot(object, &self.reserved) else {
+                        self.reject(format!("moving {object} away"), None, "I see no free spot for it".into());
+                        return None;
+                    };
+                    let aside = Literal::new("at", vec![Term::Object(object), Term::Place(spot)]);
+                    node.agenda.push(Item::Achieve(Condition::Literal(aside)));
+                }
                 Item::Perform { function, object } => {
                     for candidate in self.view.skill_candidates(object, None) {
                         if candidate.skill == function {
@@ -258,18 +275,18 @@ impl<'v> Search<'v, '_> {
         }
     }
 
-    /// Everything in the list shall stand on a free spot.
+    /// Everything in the list shall stand on a free spot, and before that what stands on it.
     fn move_away(&mut self, node: &Node<'v>, hindering: Vec<ObjectId>) {
-        let mut next = node.clone();
-        for object in hindering {
-            let Some(spot) = node.state.free_spot(object, &self.reserved) else {
-                self.reject(format!("moving {object} away"), None, "I see no free spot for it".into());
-                return;
-            };
-            let away = Literal::new("at", vec![Term::Object(object), Term::Place(spot)]);
-            next.agenda.push(Item::Achieve(Condition::Literal(away)));
+        let mut aside = hindering;
+        let mut at = 0;
+        while let Some(&object) = aside.get(at) {
+            let carried = node.state.carried_by(object);
+            aside.extend(carried.into_iter().filter(|id| !aside.contains(id)).collect::<Vec<_>>());
+            at += 1;
         }
-        if next.agenda.len() > node.agenda.len() {
+        if !aside.is_empty() {
+            let mut next = node.clone();
+            next.agenda.extend(aside.into_iter().map(Item::PutAside));
             self.push(next);
         }
     }

@@ -204,6 +204,12 @@ impl World {
             self.put(id, Place { support: None, pose, tolerance_m: 0.03 }, PlaceCause::Seen(FrameId(7)), now);
         }
     }
+    /// Somebody else takes an object away and puts it down before the eyes of the robot.
+    pub fn seen_moving(&mut self, id: ObjectId, to: Place) {
+        let now = moment(self.now);
+        self.unplace(id, Presence::Missing, PlaceCause::Gone(FrameId(3)), now);
+        self.put(id, to, PlaceCause::Seen(FrameId(4)), now);
+    }
     fn put(&mut self, id: ObjectId, place: Place, cause: PlaceCause, moment: Moment) {
         let remembers = self.remembers;
         let entry = self.entry_mut(id);
