@@ -37,7 +37,7 @@ enum Phase {
 pub(crate) fn build(spec: &WorldSpec, layout: &Layout, variables: &[String]) -> Result<Vec<Event>, LayoutError> {
     let event = |event: &crate::scenario::EventSpec| {
         let carried = &layout.find(spec, &event.carry)?.name;
-        let scope = layout.draws.scope();
+        let scope = layout.scope();
         let to = vector(&event.name, &event.to, &scope)?;
         Ok(Event {
             when: event.when.as_ref().map(|when| Watch::new(when, variables)),

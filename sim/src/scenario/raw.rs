@@ -371,7 +371,7 @@ pub(crate) struct RawEvent {
     pub(crate) when: Option<String>,
     /// What is carried.
     pub(crate) carry: RawReference,
-    /// Where its base frame comes to stand, metres.
+    /// Where its base frame comes to stand, metres. Expressions can use places and plain draws.
     pub(crate) to: [Number; 3],
     /// Its heading there, radians. Default: 0.
     #[serde(default)]
