@@ -1,7 +1,7 @@
 //! The comparison of a frame with what memory expects to see in it.
 
 use crate::{
-    raster::{self, Cast},
+    raster,
     scan::Tint,
     scene::Scene,
     segments::{NONE, Segments},
@@ -13,7 +13,7 @@ use acm_concept::{
     object::{ExpectedView, GroundedObject, GroundedPart, SupportPlane, Visibility},
     pose::Pose,
     solid::PlacedSolid,
-    template::TemplateLibrary,
+    template::{SeenBy, TemplateLibrary},
 };
 use std::collections::BTreeMap;
 
@@ -25,6 +25,8 @@ const IN_VIEW: f64 = 0.25;
 const DECIDED: f64 = 0.25;
 /// Least overlap (intersection over union) of a percept with an expected object that is called the same.
 const SAME_OVERLAP: f64 = 0.25;
+/// A percept is taken for what is expected if that explains so much of it.
+const EXPLAINED: f64 = 0.6;
 /// Expected objects split a segment if each finds at least so many of its pixels in it, and so much of itself.
 const SPLIT_PX: usize = 60;
 const SPLIT_SHARE: f64 = 0.4;
@@ -32,15 +34,16 @@ const SPLIT_SHARE: f64 = 0.4;
 /// One expected object, ray-cast.
 struct Ghost {
     id: ObjectId,
-    template: Option<String>,
-    appearance: Appearance,
+    main: Option<GroundedPart>,
     solids: Vec<PlacedSolid>,
     flat: bool,
-    held: bool,
-    cast: Cast,
+    /// Share of it that the sensor covers.
+    in_view: f64,
+    /// Its predicted pixels, ascending, and what each says.
+    votes: Vec<(usize, Vote)>,
 }
 
-/// The expected objects, ray-cast into the frame.
+/// The expected objects, ray-cast into the frame and compared with it.
 pub(crate) struct Remembered {
     ghosts: Vec<Ghost>,
 }
@@ -55,28 +58,48 @@ enum Vote {
 }
 
 impl Remembered {
-    pub fn cast(scene: &Scene, camera_pose: &Pose, expectation: &Expectation, library: &TemplateLibrary) -> Remembered {
+    pub fn cast(
+        scene: &Scene,
+        camera_pose: &Pose,
+        support: &SupportPlane,
+        expectation: &Expectation,
+        library: &TemplateLibrary,
+    ) -> Remembered {
         let ghost = |object: &ExpectedObject| {
             let solids = solids(&object.parts, library);
+            let flat = is_flat(&solids);
             let cast = raster::cast(&scene.scan.intrinsics, scene.grid, camera_pose, &solids);
+            let vote = |(pixel, depth): (usize, f64)| {
+                let vote = if flat {
+                    flat_vote(scene, &object.appearance, support, pixel)
+                } else {
+                    depth_vote(scene, object.held, pixel, depth)
+                };
+                (pixel, vote)
+            };
             Ghost {
                 id: object.id,
-                template: object.parts.first().map(|part| part.template.clone()),
-                appearance: object.appearance,
-                flat: is_flat(&solids),
-                held: object.held,
+                main: object.parts.first().cloned(),
+                flat,
+                in_view: cast.in_view,
+                votes: cast.hits.into_iter().map(vote).collect(),
                 solids,
-                cast,
             }
         };
         Remembered { ghosts: expectation.objects.iter().map(ghost).collect() }
     }
 
-    /// The template of the expected object that covers these pixels (ascending) best.
-    pub fn template_at(&self, pixels: &[usize]) -> Option<&str> {
-        let overlaps = self.ghosts.iter().map(|ghost| (overlap(ghost, pixels), ghost));
-        let (best, ghost) = overlaps.max_by(|a, b| a.0.total_cmp(&b.0))?;
-        ghost.template.as_deref().filter(|_| best > SAME_OVERLAP)
+    /// The main part of the expected object that explains these pixels (ascending) best, if one explains most of
+    /// them or is mostly covered by them.
+    pub fn part_at(&self, pixels: &[usize], seen_by: SeenBy) -> Option<&GroundedPart> {
+        let flat = seen_by == SeenBy::Color;
+        let explained = |ghost: &Ghost| {
+            let agrees = |(pixel, vote): &&(usize, Vote)| *vote == Vote::Agrees && pixels.binary_search(pixel).is_ok();
+            ghost.votes.iter().filter(agrees).count() as f64 / pixels.len().max(1) as f64
+        };
+        let candidates = self.ghosts.iter().filter(|ghost| ghost.flat == flat);
+        let (best, ghost) = candidates.map(|ghost| (explained(ghost), ghost)).max_by(|a, b| a.0.total_cmp(&b.0))?;
+        ghost.main.as_ref().filter(|_| best > EXPLAINED || overlap(ghost, pixels) > SAME_OVERLAP)
     }
 }
 
@@ -94,14 +117,18 @@ fn is_flat(solids: &[PlacedSolid]) -> bool {
     !solids.is_empty() && solids.iter().all(|s| 2.0 * s.solid.half_extents().z < FLAT_M)
 }
 
-/// Intersection over union of a ghost's pixels with a percept's (ascending).
+/// Intersection over union of a ghost's pixels, those that something nearer covers left out, with a percept's
+/// (ascending).
 fn overlap(ghost: &Ghost, pixels: &[usize]) -> f64 {
-    let common = ghost.cast.hits.iter().filter(|(pixel, _)| pixels.binary_search(pixel).is_ok()).count();
-    let union = ghost.cast.hits.len() + pixels.len() - common;
-    common as f64 / union.max(1) as f64
+    let (mut common, mut visible) = (0usize, 0usize);
+    for (pixel, _) in ghost.votes.iter().filter(|(_, vote)| *vote != Vote::Nearer) {
+        visible += 1;
+        common += usize::from(pixels.binary_search(pixel).is_ok());
+    }
+    common as f64 / (visible + pixels.len() - common).max(1) as f64
 }
 
-fn vote(scene: &Scene, ghost: &Ghost, pixel: usize, predicted: f64) -> Vote {
+fn depth_vote(scene: &Scene, held: bool, pixel: usize, predicted: f64) -> Vote {
     if scene.own[pixel] {
         return Vote::Nearer;
     }
@@ -109,7 +136,7 @@ fn vote(scene: &Scene, ghost: &Ghost, pixel: usize, predicted: f64) -> Vote {
     if measured == 0.0 {
         return Vote::Unmeasured;
     }
-    let place_m = if ghost.held { 0.03 } else { 0.01 };
+    let place_m = if held { 0.03 } else { 0.01 };
     let tolerance = place_m + 2.5 * scene.config.depth_sigma_m(measured);
     if measured < predicted - tolerance {
         Vote::Nearer
@@ -121,11 +148,11 @@ fn vote(scene: &Scene, ghost: &Ghost, pixel: usize, predicted: f64) -> Vote {
 }
 
 /// The vote of a pixel on something flat: whether the surface there has its colour or the bare surface's.
-fn flat_vote(scene: &Scene, ghost: &Ghost, support: &SupportPlane, pixel: usize) -> Vote {
+fn flat_vote(scene: &Scene, appearance: &Appearance, support: &SupportPlane, pixel: usize) -> Vote {
     if scene.own[pixel] || scene.rising[pixel] {
         return Vote::Nearer;
     }
-    let (own, bare) = (Tint::of(&ghost.appearance.mean), Tint::of(&support.appearance.mean));
+    let (own, bare) = (Tint::of(&appearance.mean), Tint::of(&support.appearance.mean));
     if !scene.is_known(pixel) || own.distance(&bare) < 8.0 {
         return Vote::Unmeasured;
     }
@@ -134,23 +161,18 @@ fn flat_vote(scene: &Scene, ghost: &Ghost, support: &SupportPlane, pixel: usize)
 }
 
 /// The verdicts on all expected objects.
-pub(crate) fn views(scene: &Scene, remembered: &Remembered, support: &SupportPlane) -> Vec<ExpectedView> {
-    remembered.ghosts.iter().map(|ghost| view(scene, ghost, support)).collect()
+pub(crate) fn views(remembered: &Remembered) -> Vec<ExpectedView> {
+    remembered.ghosts.iter().map(view).collect()
 }
 
-fn view(scene: &Scene, ghost: &Ghost, support: &SupportPlane) -> ExpectedView {
-    let total = ghost.cast.hits.len();
+fn view(ghost: &Ghost) -> ExpectedView {
+    let total = ghost.votes.len();
     let answer = |visibility, fraction| ExpectedView { object: ghost.id, visibility, fraction };
-    if total < 12 || ghost.cast.in_view < IN_VIEW {
-        return answer(Visibility::OutOfView, 1.0 - ghost.cast.in_view);
+    if total < 12 || ghost.in_view < IN_VIEW {
+        return answer(Visibility::OutOfView, 1.0 - ghost.in_view);
     }
-    let mut votes = [0usize; 4];
-    for &(pixel, predicted) in &ghost.cast.hits {
-        let vote =
-            if ghost.flat { flat_vote(scene, ghost, support, pixel) } else { vote(scene, ghost, pixel, predicted) };
-        votes[vote as usize] += 1;
-    }
-    let [agrees, nearer, farther, unmeasured] = votes.map(|count| count as f64 / total as f64);
+    let share = |vote| ghost.votes.iter().filter(|(_, v)| *v == vote).count() as f64 / total as f64;
+    let (agrees, farther) = (share(Vote::Agrees), share(Vote::Farther));
     if agrees + farther >= DECIDED {
         return if agrees >= farther {
             answer(Visibility::Seen, agrees)
@@ -158,6 +180,7 @@ fn view(scene: &Scene, ghost: &Ghost, support: &SupportPlane) -> ExpectedView {
             answer(Visibility::SeenThrough, farther)
         };
     }
+    let (nearer, unmeasured) = (share(Vote::Nearer), share(Vote::Unmeasured));
     if nearer >= unmeasured {
         answer(Visibility::Occluded, nearer)
     } else {
@@ -203,8 +226,7 @@ pub(crate) fn split(scene: &Scene, remembered: &Remembered, segments: &mut Segme
     for ghost in remembered.ghosts.iter().filter(|ghost| !ghost.flat) {
         let mut agreeing: BTreeMap<u32, usize> = BTreeMap::new();
         let mut visible = 0usize;
-        for &(pixel, predicted) in &ghost.cast.hits {
-            let vote = vote(scene, ghost, pixel, predicted);
+        for &(pixel, vote) in &ghost.votes {
             visible += usize::from(vote != Vote::Nearer);
             if vote == Vote::Agrees && segments.labels[pixel] != NONE {
                 *agreeing.entry(segments.labels[pixel]).or_insert(0) += 1;

@@ -8,7 +8,7 @@ mod profile;
 pub(crate) use evidence::{Evidence, OutlineKind, OutlinePoint, SurfacePoint};
 pub(crate) use minimise::{Minimum, approach, cost, minimise, rough_cost};
 pub(crate) use model::{Base, Model, corners};
-pub(crate) use profile::observability;
+pub(crate) use profile::{Profile, profile};
 
 #[cfg(test)]
 mod tests;

@@ -186,3 +186,72 @@ fn wrong_kind(path: &Path, role: &'static str, image: &DynamicImage, expected: &
     };
     ReadFrameError::Kind { path: path.to_path_buf(), role, actual, expected }
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)] // A failed unwrap is a failed test.
+    use super::*;
+    use std::fs;
+
+    const INTRINSICS: (f64, f64, f64, f64) = (50.0, 50.0, 15.5, 11.5);
+
+    struct Folder(PathBuf);
+
+    impl Folder {
+        fn new(name: &str) -> Folder {
+            let path = std::env::temp_dir().join(format!("acm-frames-{name}-{}", std::process::id()));
+            fs::create_dir_all(&path).unwrap();
+            Folder(path)
+        }
+        fn color(&self, width: u32, height: u32) -> PathBuf {
+            let path = self.0.join("color.png");
+            image::RgbImage::from_pixel(width, height, image::Rgb([10, 200, 30])).save(&path).unwrap();
+            path
+        }
+        fn depth(&self, value: u16) -> PathBuf {
+            let path = self.0.join("depth.png");
+            image::ImageBuffer::<image::Luma<u16>, _>::from_pixel(32, 24, image::Luma([value])).save(&path).unwrap();
+            path
+        }
+    }
+
+    impl Drop for Folder {
+        fn drop(&mut self) {
+            fs::remove_dir_all(&self.0).ok();
+        }
+    }
+
+    fn read(color: &Path, depth: &Path) -> Result<RgbdFrame, ReadFrameError> {
+        read_pair(color, depth, INTRINSICS, 0.001, Some(Pose::IDENTITY), FrameId(3), Time::ZERO)
+    }
+
+    #[test]
+    fn a_pair_becomes_a_frame_in_metres() {
+        let folder = Folder::new("pair");
+        let frame = read(&folder.color(32, 24), &folder.depth(1250)).unwrap();
+        assert_eq!((frame.rgb(5), frame.depth[7]), ([10, 200, 30], 1.25));
+        assert_eq!((frame.header.intrinsics.width, frame.header.id), (32, FrameId(3)));
+    }
+
+    #[test]
+    fn mistakes_are_named_with_their_file() {
+        let folder = Folder::new("mistakes");
+        let (color, depth) = (folder.color(32, 24), folder.depth(800));
+        let message = |result: Result<RgbdFrame, ReadFrameError>| result.unwrap_err().to_string();
+        let missing = message(read(&folder.0.join("nothing.png"), &depth));
+        assert!(missing.contains("nothing.png") && missing.contains("cannot open"), "{missing}");
+        let swapped = message(read(&color, &color));
+        assert!(swapped.contains("8-bit RGB") && swapped.contains("16-bit grey"), "{swapped}");
+        assert!(message(read(&depth, &depth)).contains("16-bit grey, but a colour image must be 8-bit RGB"));
+        let sizes = message(read(&folder.color(16, 24), &depth));
+        assert!(sizes.contains("(16, 24)") && sizes.contains("(32, 24)"), "{sizes}");
+        let text = folder.0.join("text.png");
+        fs::write(&text, "no image").unwrap();
+        assert!(message(read(&text, &depth)).contains("text.png cannot be read as a PNG"));
+        let color = folder.color(32, 24);
+        let scaled = read_pair(&color, &depth, INTRINSICS, 0.0, None, FrameId(0), Time::ZERO);
+        assert!(message(scaled).contains("depth scale must be positive"));
+        let flat = read_pair(&color, &depth, (0.0, 50.0, 1.0, 1.0), 0.001, None, FrameId(0), Time::ZERO);
+        assert!(message(flat).contains("fx must be positive"));
+    }
+}

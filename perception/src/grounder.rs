@@ -66,14 +66,15 @@ impl Grounder {
             return blind(Blindness::NoSupport, scan.depth_fraction);
         };
         let scene = Scene::new(&scan, &plane, &frame.header.camera_pose, own, &self.config);
-        let remembered = Remembered::cast(&scene, &frame.header.camera_pose, expectation, &self.library);
+        let support = support_plane(&scene, &plane);
+        let camera_pose = &frame.header.camera_pose;
+        let remembered = Remembered::cast(&scene, camera_pose, &support, expectation, &self.library);
         let mut objects = self.objects(&scene, expectation, &remembered);
         objects.retain(|object| object.confidence >= self.config.min_confidence);
         objects.sort_by(|a, b| b.support.count.cmp(&a.support.count).then(a.support.runs.cmp(&b.support.runs)));
         objects.truncate(self.config.max_objects);
-        let support = support_plane(&scene, &plane);
         expected::hint(&remembered, &mut objects, &self.library);
-        let expected = expected::views(&scene, &remembered, &support);
+        let expected = expected::views(&remembered);
         Percepts {
             frame: frame.header.clone(),
             support: Some(support),
@@ -112,7 +113,7 @@ impl Grounder {
         let (mut objects, mut bodies) = (Vec::new(), Bodies::default());
         for patch in patches::find(scene, &standing) {
             let measured = Measured { plan: patch.plan, height_m: 0.0, base: Base::At(0.0), seen_by: SeenBy::Color };
-            let context = context(remembered.template_at(&patch.pixels));
+            let context = context(remembered.part_at(&patch.pixels, SeenBy::Color));
             let ranked = hypotheses::rank(context, &measured, &patch.evidence);
             if let Some(object) = assemble::object(scene, context, &ranked, &patch.evidence, &patch.pixels, patch.fill)
             {
@@ -139,7 +140,7 @@ impl Grounder {
             };
             let height_m = evidence.top_m() - bottom;
             let measured = Measured { plan, height_m, base, seen_by: SeenBy::Depth };
-            let context = context(remembered.template_at(&pixels));
+            let context = context(remembered.part_at(&pixels, SeenBy::Depth));
             let ranked = hypotheses::rank(context, &measured, &evidence);
             if let Some(object) = assemble::object(scene, context, &ranked, &evidence, &pixels, 1.0) {
                 bodies.add(&ranked);

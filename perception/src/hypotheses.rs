@@ -6,7 +6,10 @@ use crate::{
     fit::{Base, Evidence, Minimum, Model, OutlineKind, approach, cost, minimise, rough_cost},
     measure::{self, Rectangle},
 };
-use acm_concept::template::{SeenBy, Template, TemplateLibrary};
+use acm_concept::{
+    object::GroundedPart,
+    template::{SeenBy, Template, TemplateLibrary},
+};
 use glam::DVec2;
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
@@ -29,8 +32,8 @@ pub(crate) struct Context<'a> {
     pub config: &'a GrounderConfig,
     /// Nouns of the instruction.
     pub nouns: &'a [String],
-    /// Template under which memory knows what it expects here.
-    pub remembered: Option<&'a str>,
+    /// The main part of what memory expects here.
+    pub remembered: Option<&'a GroundedPart>,
 }
 
 /// One template with its fit.
@@ -38,12 +41,16 @@ pub(crate) struct Context<'a> {
 pub(crate) struct Hypothesis<'a> {
     pub model: Model<'a>,
     pub minimum: Minimum,
-    /// Posterior probability among the templates that were tried.
+    /// Posterior probability among the hypotheses that were tried.
     pub probability: f64,
+    /// The remembered part whose parameters were taken over, so that only the place was fitted.
+    pub tracked: Option<&'a GroundedPart>,
 }
 
 /// Headings that are tried as starts: a quarter turn in steps of 7.5 degrees.
 const YAW_STEP: f64 = std::f64::consts::PI / 24.0;
+/// A thing of which more than this share of the outline is cut off may take over its remembered size.
+const TRACKED_CUT: f64 = 0.15;
 /// Starts that are fitted of each template.
 const STARTS: usize = 2;
 
@@ -56,9 +63,10 @@ pub(crate) fn rank<'a>(context: Context<'a>, measured: &Measured, evidence: &Evi
         .filter_map(|template| {
             let (model, minimum) = best_fit(template, measured, &rectangles, circle, evidence)?;
             let score = score(context, &model, &minimum, evidence);
-            Some((score, Hypothesis { model, minimum, probability: 0.0 }))
+            Some((score, Hypothesis { model, minimum, probability: 0.0, tracked: None }))
         })
         .collect();
+    scored.extend(track(context, measured, &rectangles, evidence));
     scored.sort_by(|a, b| b.0.total_cmp(&a.0));
     let Some(best) = scored.first().map(|(score, _)| *score) else { return Vec::new() };
     // Where even the best fits badly the likelihoods of all are less sure than they look.
@@ -102,6 +110,31 @@ fn best_fit<'a>(
     Some((model, minimum))
 }
 
+/// The remembered part with its remembered parameters, moved to where the evidence is: what is seen of it may be
+/// too little to measure it anew. It competes with the other hypotheses by its likelihood like any of them.
+fn track<'a>(
+    context: Context<'a>,
+    measured: &Measured,
+    rectangles: &[Rectangle],
+    evidence: &Evidence,
+) -> Option<(f64, Hypothesis<'a>)> {
+    let part = context.remembered.filter(|_| evidence.cut_share() > TRACKED_CUT)?;
+    let template = context.library.get(&part.template).filter(|t| t.seen_by == measured.seen_by)?;
+    let values: Vec<f64> = template.parameters.iter().map(|p| part.value(&p.name)).collect::<Option<_>>()?;
+    let model = Model::rigid(template, values, measured.base)?;
+    let place = part.pose.pose.translation.truncate();
+    let own = (place, part.pose.pose.yaw());
+    let starts = std::iter::once(own).chain(rectangles.iter().map(|r| (r.centre, r.yaw)));
+    let rough = |(at, yaw): (DVec2, f64)| {
+        let start = model.start(at, yaw);
+        (rough_cost(&model, evidence, &start), start)
+    };
+    let (_, start) = starts.map(rough).min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let minimum = minimise(&model, evidence, &approach(&model, evidence, &start));
+    let score = score(context, &model, &minimum, evidence);
+    Some((score, Hypothesis { model, minimum, probability: 0.0, tracked: Some(part) }))
+}
+
 /// The same solids under parameter values that the template admits: as they are, or with two parameters exchanged
 /// and a quarter turn (a box's length and width). `None` if there are no such values.
 fn canonical(model: &Model, minimum: Minimum, evidence: &Evidence) -> Option<Minimum> {
@@ -139,7 +172,7 @@ fn score(context: Context, model: &Model, minimum: &Minimum, evidence: &Evidence
     if spoken_of {
         score += context.config.noun_boost.ln();
     }
-    if context.remembered == Some(template.name.as_str()) {
+    if context.remembered.is_some_and(|part| part.template == template.name) {
         score += context.config.memory_boost.ln();
     }
     score

@@ -41,7 +41,7 @@ mod tests {
             Plane { normal: DVec3::new(0.02, -0.6, -0.8).normalize(), offset: -0.7, residual_m: 0.0, noise_ratio: 1.0 };
         let pose = pose_over(&plane).unwrap();
         let ray = DVec3::new(0.1, 0.2, 1.0);
-        let point = pose.transform_point(ray * plane.depth_along(ray).unwrap());
+        let point = pose.transform_point(ray * (plane.offset / plane.normal.dot(ray)));
         assert!(point.z.abs() < 1e-9, "{point}");
         assert!(pose.translation.distance(DVec3::new(0.0, 0.0, 0.7)) < 1e-9);
         let right = pose.transform_vector(DVec3::X);

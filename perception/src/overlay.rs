@@ -33,11 +33,14 @@ pub fn draw(frame: &RgbdFrame, percepts: &Percepts, names: &[Option<String>], li
             wire_frame(&mut image, percepts, &solid, color);
         }
     }
+    let boxes: Vec<[i64; 4]> = percepts.objects.iter().map(|o| o.support.bounds.map(i64::from)).collect();
     let mut taken: Vec<[i64; 4]> = Vec::new();
     for (index, object) in percepts.objects.iter().enumerate() {
         let name = names.get(index).cloned().flatten().unwrap_or_else(|| format!("#{index}"));
         let lines = [format!("{name} {}", object.category), size_text(object, library)];
-        caption(&mut image, object, &lines, PALETTE[index % PALETTE.len()], &mut taken);
+        let place = place_of(&image, &lines, boxes[index], &boxes, &taken);
+        caption(&mut image, place, &lines, boxes[index], PALETTE[index % PALETTE.len()]);
+        taken.push(place);
     }
     if let Some(blindness) = percepts.blindness {
         font::text(&mut image, 8, 8, &format!("blind: {blindness:?}"), Rgb([255, 80, 80]));
@@ -83,7 +86,12 @@ fn outline(image: &mut RgbImage, owners: &labels::LabelImage, label: u16, color:
         for column in 1..width.saturating_sub(1) {
             let own = |x: u32, y: u32| owners.get_pixel(x, y).0[0] == label;
             let around = [(column - 1, row), (column + 1, row), (column, row - 1), (column, row + 1)];
-            if own(column, row) && around.iter().any(|&(x, y)| !own(x, y)) {
+            // A lone foreign pixel is a hole in the depth, not a border.
+            let is_hole = |x: u32, y: u32| {
+                let near = [(x.wrapping_sub(1), y), (x + 1, y), (x, y.wrapping_sub(1)), (x, y + 1)];
+                near.iter().filter(|&&(x, y)| x < width && y < height && own(x, y)).count() >= 3
+            };
+            if own(column, row) && around.iter().any(|&(x, y)| !own(x, y) && !is_hole(x, y)) {
                 blend(image, i64::from(column), i64::from(row), color, 0.7);
             }
         }
@@ -127,26 +135,66 @@ fn blend(image: &mut RgbImage, column: i64, row: i64, color: Rgb<u8>, share: f32
     }
 }
 
-/// Writes lines above the object, or below it where something is written already.
-fn caption(image: &mut RgbImage, object: &GroundedObject, lines: &[String], color: Rgb<u8>, taken: &mut Vec<[i64; 4]>) {
-    let [left, top, right, bottom] = object.support.bounds.map(i64::from);
-    let width = lines.iter().map(|line| font::width(line)).max().unwrap_or(0);
-    let height = lines.len() as i64 * font::LINE;
-    let (image_width, image_height) = (i64::from(image.width()), i64::from(image.height()));
-    let middle = ((left + right - width) / 2).clamp(2, (image_width - width - 2).max(2));
-    let places = [top - height - 3, bottom + 4, top - 2 * height - 6, bottom + height + 7, (top + bottom - height) / 2];
-    let free = |y: &i64| {
-        let clear = |r: &[i64; 4]| middle + width < r[0] || r[2] < middle || y + height < r[1] || r[3] < *y;
-        *y >= 2 && y + height < image_height && taken.iter().all(clear)
-    };
-    let y = places.into_iter().find(free).unwrap_or(places[4]).clamp(2, (image_height - height).max(2));
-    taken.push([middle, y, middle + width, y + height]);
-    for row in y - 2..y + height {
-        for column in middle - 2..middle + width + 2 {
-            blend(image, column, row, Rgb([0, 0, 0]), 0.6);
+/// The rectangle (left, top, right, bottom) for a caption: near its object, and over as little as possible of objects
+/// and of other captions.
+fn place_of(
+    image: &RgbImage,
+    lines: &[String],
+    object: [i64; 4],
+    objects: &[[i64; 4]],
+    taken: &[[i64; 4]],
+) -> [i64; 4] {
+    let width = lines.iter().map(|line| font::width(line)).max().unwrap_or(0) + 4;
+    let height = lines.len() as i64 * font::LINE + 3;
+    let (middle, centre) = ((object[0] + object[2]) / 2, (object[1] + object[3]) / 2);
+    let mut best = (i64::MAX, [0; 4]);
+    for step in 0..12i64 {
+        let gap = 4 + 8 * step;
+        let corners = [
+            (middle - width / 2, object[1] - height - gap),
+            (middle - width / 2, object[3] + gap),
+            (object[2] + gap, centre - height / 2),
+            (object[0] - width - gap, centre - height / 2),
+            (object[2] + gap, object[1] - height - gap),
+            (object[0] - width - gap, object[3] + gap),
+        ];
+        for (left, top) in corners {
+            let left = left.clamp(0, (i64::from(image.width()) - width).max(0));
+            let top = top.clamp(0, (i64::from(image.height()) - height).max(0));
+            let place = [left, top, left + width, top + height];
+            let covered: i64 = objects.iter().map(|o| common_area(&place, o)).sum();
+            let overwritten: i64 = taken.iter().map(|t| common_area(&place, t)).sum();
+            let cost = covered + 20 * overwritten + 12 * gap;
+            if cost < best.0 {
+                best = (cost, place);
+            }
+        }
+    }
+    best.1
+}
+
+fn common_area(a: &[i64; 4], b: &[i64; 4]) -> i64 {
+    (a[2].min(b[2]) - a[0].max(b[0])).max(0) * (a[3].min(b[3]) - a[1].max(b[1])).max(0)
+}
+
+/// Writes lines into a rectangle and joins it to its object.
+fn caption(image: &mut RgbImage, place: [i64; 4], lines: &[String], object: [i64; 4], color: Rgb<u8>) {
+    let [left, top, right, bottom] = place;
+    let nearest = |value: i64, low: i64, high: i64| value.clamp(low, high);
+    let to = [(object[0] + object[2]) / 2, (object[1] + object[3]) / 2];
+    let from = [nearest(to[0], left, right), nearest(to[1], top, bottom)];
+    let end = [nearest(from[0], object[0], object[2]), nearest(from[1], object[1], object[3])];
+    let steps = (end[0] - from[0]).abs().max((end[1] - from[1]).abs()).clamp(1, 400);
+    for step in (0..=steps).step_by(2) {
+        let at = |axis: usize| from[axis] + (end[axis] - from[axis]) * step / steps;
+        blend(image, at(0), at(1), color, 0.8);
+    }
+    for row in top..bottom {
+        for column in left..right {
+            blend(image, column, row, Rgb([0, 0, 0]), 0.65);
         }
     }
     for (index, text) in lines.iter().enumerate() {
-        font::text(image, middle, y + index as i64 * font::LINE, text, color);
+        font::text(image, left + 2, top + 2 + index as i64 * font::LINE, text, color);
     }
 }

@@ -84,11 +84,11 @@ impl<'a> Scene<'a> {
         let depth = f64::from(self.scan.depth[pixel]);
         (depth > 0.0).then(|| self.camera.transform_point(self.scan.ray(pixel) * depth))
     }
-    /// Height over the plane that only the lowest twenty-fifth of some pixels does not reach, metres.
+    /// Height over the plane that only the lowest seventieth of some pixels does not reach, metres.
     pub fn lowest_m(&self, pixels: &[usize]) -> f64 {
         let mut heights: Vec<f32> = pixels.iter().filter(|&&i| self.is_known(i)).map(|&i| self.point[i].z).collect();
         heights.sort_by(f32::total_cmp);
-        heights.get(heights.len() / 25).map_or(0.0, |h| f64::from(*h))
+        heights.get(heights.len() / 70).map_or(0.0, |h| f64::from(*h))
     }
     pub fn is_known(&self, pixel: usize) -> bool {
         !self.point[pixel].z.is_nan()

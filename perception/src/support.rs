@@ -28,12 +28,6 @@ impl Plane {
     pub fn distance(&self, point: DVec3) -> f64 {
         self.normal.dot(point) - self.offset
     }
-    /// Depth at which a ray with z = 1 meets the plane, if it does so in front of the camera.
-    pub fn depth_along(&self, ray: DVec3) -> Option<f64> {
-        let slope = self.normal.dot(ray);
-        let depth = self.offset / slope;
-        (slope < -1e-6 && depth > 0.0).then_some(depth)
-    }
 }
 
 /// Which planes may be the support: the unit vector that points up in the camera frame and the largest angle of
@@ -197,13 +191,54 @@ fn least_squares(coarse: &Coarse, inliers: &[usize], old: &Plane, upright: Uprig
 #[cfg(test)]
 mod tests {
     use super::*;
+    use acm_concept::{
+        camera::{FrameHeader, Intrinsics, RgbdFrame},
+        ids::FrameId,
+        pose::Pose,
+        time::Time,
+    };
+    use proptest::prelude::{ProptestConfig, prop_assert, proptest};
+
+    /// A frame that shows a plane, a nearer wall in its left third, and noise.
+    fn frame(normal: DVec3, offset: f64, noise_m: f64) -> RgbdFrame {
+        let intrinsics = Intrinsics::from_vertical_fov(160, 120, 0.9);
+        let mut random = ChaCha8Rng::seed_from_u64(5);
+        let depth: Vec<f32> = (0..intrinsics.pixels())
+            .map(|i| {
+                let ray = intrinsics.ray((i % 160) as f64, (i / 160) as f64);
+                let depth = if i % 160 < 50 { 0.6 } else { offset / normal.dot(ray) };
+                (depth + noise_m * random.random_range(-1.0..1.0)) as f32
+            })
+            .collect();
+        let header = FrameHeader {
+            id: FrameId(0),
+            camera: "test".into(),
+            time: Time::ZERO,
+            intrinsics,
+            camera_pose: Pose::IDENTITY,
+        };
+        RgbdFrame::new(header, vec![90; 3 * intrinsics.pixels()].into(), depth.into()).unwrap()
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(12))]
+        #[test]
+        fn a_noisy_plane_is_found_beside_a_wall(pitch in 0.7..1.2f64, roll in -0.05..0.05f64, height in 0.5..1.2f64) {
+            let normal = DVec3::new(roll, -pitch.cos(), -pitch.sin()).normalize();
+            let config = GrounderConfig::default();
+            let scan = Scan::read(&frame(normal, -height, 0.004), &config).ok().unwrap();
+            let upright = Upright { up: DVec3::new(0.0, -pitch.cos(), -pitch.sin()), max_angle_rad: 0.15 };
+            let plane = find(&scan, &vec![false; scan.grid.len()], upright, &config).unwrap();
+            prop_assert!(plane.normal.angle_between(normal) < 0.006, "{:?}", plane);
+            prop_assert!((plane.offset + height).abs() < 0.003, "{:?}", plane);
+        }
+    }
 
     #[test]
-    fn a_ray_meets_the_plane_where_its_distance_is_zero() {
-        let plane = Plane { normal: DVec3::new(0.0, -0.6, -0.8), offset: -0.7, residual_m: 0.0, noise_ratio: 1.0 };
-        let ray = DVec3::new(0.1, 0.2, 1.0);
-        let depth = plane.depth_along(ray).unwrap();
-        assert!(plane.distance(ray * depth).abs() < 1e-12);
-        assert_eq!(plane.depth_along(DVec3::new(0.0, -2.0, 1.0)), None);
+    fn a_wall_is_no_support() {
+        let config = GrounderConfig::default();
+        let scan = Scan::read(&frame(DVec3::NEG_Z, -0.9, 0.002), &config).ok().unwrap();
+        let upright = Upright { up: DVec3::NEG_Y, max_angle_rad: 0.2 };
+        assert_eq!(find(&scan, &vec![false; scan.grid.len()], upright, &config), None);
     }
 }

@@ -76,10 +76,17 @@ pub(crate) fn rough_cost(model: &Model, evidence: &Evidence, state: &[f64]) -> f
 }
 
 /// The state with one quantity held at its value and the others re-fitted by a few steps, and its cost.
-pub(crate) fn refit_others(model: &Model, evidence: &Evidence, state: &[f64], frozen: usize, steps: usize) -> f64 {
+pub(crate) fn refit_others(
+    model: &Model,
+    evidence: &Evidence,
+    state: &[f64],
+    frozen: usize,
+    steps: usize,
+) -> (Vec<f64>, f64) {
     let problem = Problem { model, evidence, start: state, frozen: Some(frozen) };
     let state = problem.descend(state.to_vec(), 1.0, steps, Share::All);
-    cost(model, evidence, &state)
+    let cost = cost(model, evidence, &state);
+    (state, cost)
 }
 
 struct Problem<'a> {

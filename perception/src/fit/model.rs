@@ -51,6 +51,11 @@ impl<'a> Model<'a> {
         let free = (0..template.parameters.len()).filter(|&i| !template.parameters[i].fixed).collect();
         Some(Model { template, turns: symmetry != YawSymmetry::Continuous, base, free, initial })
     }
+    /// A model whose parameters stay at `values`: only its place is fitted.
+    pub fn rigid(template: &'a Template, values: Vec<f64>, base: Base) -> Option<Model<'a>> {
+        let model = Model::new(template, values, base)?;
+        Some(Model { free: Vec::new(), ..model })
+    }
     /// Index of the heading in the state.
     pub fn yaw_index(&self) -> Option<usize> {
         self.turns.then_some(2)

@@ -1,16 +1,16 @@
 //! From ranked hypotheses to a grounded object: calibrated uncertainty, canonical heading, appearance, confidence.
 
 use crate::{
-    fit::{Evidence, observability},
+    fit::{Evidence, Profile, profile},
     hypotheses::{self, Context, Hypothesis},
     scene::Scene,
 };
 use acm_concept::{
     object::{GroundedObject, GroundedPart, Observability, ParameterEstimate, PixelSupport, PoseEstimate},
     pose::Pose,
-    template::{SeenBy, Unit, YawSymmetry},
+    template::{Unit, YawSymmetry},
 };
-use glam::{DQuat, DVec3};
+use glam::{DQuat, DVec2, DVec3};
 
 /// A thing is truncated if more than this share of its outline is not its own.
 const CUT_SHARE: f64 = 0.12;
@@ -33,12 +33,14 @@ pub(super) fn object(
     let best = ranked.iter().find(offers).or(ranked.first())?;
     let mut mask = vec![false; scene.grid.len()];
     for &pixel in pixels {
-        mask[pixel] = scene.scan.depth[pixel] > 0.0 || best.model.template.seen_by == SeenBy::Color;
+        mask[pixel] = true;
     }
     let support = PixelSupport::from_mask(&mask, scene.grid.width)?;
     let appearance = scene.scan.appearance(&inner(scene, &mask, pixels));
     let (on_surface, on_outline) = best.explained(evidence);
-    let explained = on_surface * (0.4 + 0.6 * on_outline);
+    // What is cut off all round may be anything.
+    let whole = 1.0 - 0.6 * evidence.cut_share();
+    let explained = on_surface * (0.4 + 0.6 * on_outline) * whole;
     let part = part(scene, best, evidence, appearance)?;
     Some(GroundedObject {
         category: category.clone(),
@@ -71,28 +73,24 @@ fn part(
     let named = template.named(&placement.values);
     let symmetry = template.yaw_symmetry(&named).ok()?;
     let calibration = Calibration::new(scene, &scene.world.transform_point(placement.pose.translation));
-    let deviation = |index: usize| minimum.covariance[(index, index)].max(0.0).sqrt();
-    let parameters: Vec<ParameterEstimate> = observability(model, evidence, minimum)
-        .into_iter()
-        .enumerate()
-        .map(|(i, observability)| {
-            let spec = &template.parameters[i];
-            let spread = |low: f64, high: f64| (high - low).abs() / 12f64.sqrt();
-            let fitted = model.parameter_index(i).map_or(0.0, deviation);
-            let sigma = match (observability, spec.unit) {
-                (Observability::PriorOnly, _) => spread(spec.min, spec.max),
-                (Observability::Interval { low, high }, _) => calibration.length(fitted).max(spread(low, high)),
-                (Observability::Observed, Unit::M) => calibration.length(fitted),
-                (Observability::Observed, _) => calibration.angle(fitted, 0.05),
-            };
-            ParameterEstimate { name: spec.name.clone(), value: placement.values[i], sigma, observability }
-        })
-        .collect();
+    let deviation = |index: usize| deviation(hypothesis, index);
+    let (parameters, drift_m) = match hypothesis.tracked {
+        // Nothing of its size was measured anew.
+        Some(known) => {
+            let prior =
+                |p: &ParameterEstimate| ParameterEstimate { observability: Observability::PriorOnly, ..p.clone() };
+            (known.parameters.iter().map(prior).collect(), DVec2::ZERO)
+        }
+        None => {
+            let profile = profile(model, evidence, minimum);
+            (measured_parameters(hypothesis, &profile, &calibration), profile.drift_m)
+        }
+    };
     let reach =
         model.solids(&minimum.state).iter().map(|s| s.solid.half_extents().truncate().length()).fold(0.01, f64::max);
     let position_sigma_m = DVec3::new(
-        calibration.length(deviation(0)),
-        calibration.length(deviation(1)),
+        calibration.length(deviation(0)).hypot(drift_m.x),
+        calibration.length(deviation(1)).hypot(drift_m.y),
         calibration.length(model.base_index().map_or(0.0, deviation)),
     );
     let yaw_sigma_rad = model.yaw_index().map_or(0.01, |i| calibration.angle(deviation(i), reach));
@@ -105,6 +103,32 @@ fn part(
         functions: template.functions.iter().map(|f| f.name.clone()).collect(),
         appearance,
     })
+}
+
+fn deviation(hypothesis: &Hypothesis, index: usize) -> f64 {
+    hypothesis.minimum.covariance[(index, index)].max(0.0).sqrt()
+}
+
+fn measured_parameters(
+    hypothesis: &Hypothesis,
+    profile: &Profile,
+    calibration: &Calibration,
+) -> Vec<ParameterEstimate> {
+    let (model, minimum) = (&hypothesis.model, &hypothesis.minimum);
+    let values = model.placement(&minimum.state).values;
+    let spread = |low: f64, high: f64| (high - low).abs() / 12f64.sqrt();
+    let estimate = |(i, &observability): (usize, &Observability)| {
+        let spec = &model.template.parameters[i];
+        let fitted = model.parameter_index(i).map_or(0.0, |index| deviation(hypothesis, index));
+        let sigma = match (observability, spec.unit) {
+            (Observability::PriorOnly, _) => spread(spec.min, spec.max),
+            (Observability::Interval { low, high }, _) => calibration.length(fitted).max(spread(low, high)),
+            (Observability::Observed, Unit::M) => calibration.length(fitted),
+            (Observability::Observed, _) => calibration.angle(fitted, 0.05),
+        };
+        ParameterEstimate { name: spec.name.clone(), value: values[i], sigma, observability }
+    };
+    profile.parameters.iter().enumerate().map(estimate).collect()
 }
 
 /// The pose in the world, with the heading nearest to zero among the equivalent ones. A small tilt of the plane is

@@ -64,9 +64,9 @@ impl World {
     pub fn gripper(&mut self, tip: DVec3) -> Vec<PlacedSolid> {
         let mut own = Vec::new();
         for side in [-1.0, 1.0] {
-            own.push(cuboid(DVec3::new(0.02, 0.012, 0.06), tip + DVec3::Y * side * 0.045, 0.0, GREY));
+            own.push(cuboid(DVec3::new(0.012, 0.02, 0.06), tip + DVec3::X * side * 0.045, 0.0, GREY));
         }
-        own.push(cuboid(DVec3::new(0.06, 0.14, 0.05), tip + DVec3::Z * 0.06, 0.0, [0.2, 0.2, 0.25]));
+        own.push(cuboid(DVec3::new(0.14, 0.06, 0.05), tip + DVec3::Z * 0.06, 0.0, [0.2, 0.2, 0.25]));
         own.push(cuboid(DVec3::new(0.05, 0.05, 0.12), tip + DVec3::Z * 0.11, 0.0, [0.2, 0.2, 0.25]));
         self.things.extend(own.iter().cloned());
         own.into_iter().map(|thing| thing.solid).collect()
