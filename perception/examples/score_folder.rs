@@ -7,6 +7,7 @@ use acm_concept::{expectation::Expectation, ids::FrameId, template::TemplateLibr
 use acm_perception::{Grounder, GrounderConfig, frames, labels, metrics, overlay};
 use std::{error::Error, path::Path, time::Instant};
 
+#[allow(clippy::disallowed_methods)] // The speed of grounding is what it measures.
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
     let folder = arguments.next().ok_or("name the folder with the frames")?;

@@ -51,6 +51,10 @@ pub(crate) struct Hypothesis<'a> {
 const YAW_STEP: f64 = std::f64::consts::PI / 24.0;
 /// A thing of which more than this share of the outline is cut off may take over its remembered size.
 const TRACKED_CUT: f64 = 0.15;
+/// After a rough fit, templates with a higher cost (negative log likelihood) than this many times the best one's, and
+/// this much more, are dropped.
+const HOPELESS_FACTOR: f64 = 1.5;
+const HOPELESS_COST: f64 = 25.0;
 /// Starts that are fitted of each template.
 const STARTS: usize = 2;
 
@@ -59,9 +63,14 @@ pub(crate) fn rank<'a>(context: Context<'a>, measured: &Measured, evidence: &Evi
     let rectangles = measure::rectangles(&measured.plan, YAW_STEP, 0.01);
     let circle = measure::circle(&measured.plan);
     let templates = context.library.iter().filter(|template| template.seen_by == measured.seen_by);
-    let mut scored: Vec<(f64, Hypothesis<'a>)> = templates
-        .filter_map(|template| {
-            let (model, minimum) = best_fit(template, measured, &rectangles, circle, evidence)?;
+    let near: Vec<Approach> =
+        templates.filter_map(|template| nearest(template, measured, &rectangles, circle, evidence)).collect();
+    let best = near.iter().map(|a| a.cost).fold(f64::INFINITY, f64::min);
+    // What is far behind after the rough fit is not worth a fine one.
+    let promising = near.into_iter().filter(|a| a.cost < HOPELESS_FACTOR * best + HOPELESS_COST);
+    let mut scored: Vec<(f64, Hypothesis<'a>)> = promising
+        .filter_map(|Approach { model, state, .. }| {
+            let minimum = canonical(&model, minimise(&model, evidence, &state), evidence)?;
             let score = score(context, &model, &minimum, evidence);
             Some((score, Hypothesis { model, minimum, probability: 0.0, tracked: None }))
         })
@@ -77,21 +86,28 @@ pub(crate) fn rank<'a>(context: Context<'a>, measured: &Measured, evidence: &Evi
     scored.into_iter().zip(odds).map(|((_, h), odd)| Hypothesis { probability: odd / total, ..h }).collect()
 }
 
-fn best_fit<'a>(
+/// A template brought near to a minimum.
+struct Approach<'a> {
+    model: Model<'a>,
+    state: Vec<f64>,
+    cost: f64,
+}
+
+/// The best of several starts of a template, brought near to a minimum.
+fn nearest<'a>(
     template: &'a Template,
     measured: &Measured,
     rectangles: &[Rectangle],
     circle: Option<(DVec2, f64)>,
     evidence: &Evidence,
-) -> Option<(Model<'a>, Minimum)> {
+) -> Option<Approach<'a>> {
     let smallest = measure::smallest(rectangles)?;
     let fallback = (smallest.centre, 0.25 * (smallest.length + smallest.width));
     let (centre, radius) =
         circle.filter(|(_, r)| *r < smallest.length && *r > 0.2 * smallest.length).unwrap_or(fallback);
     let start_at = |rectangle: &Rectangle| {
-        let initial =
-            template.initial_values([rectangle.length, rectangle.width, measured.height_m.max(0.0), radius]).ok()?;
-        let model = Model::new(template, initial, measured.base)?;
+        let measures = [rectangle.length, rectangle.width, measured.height_m.max(0.0), radius];
+        let model = Model::new(template, template.initial_values(measures).ok()?, measured.base)?;
         let at = if model.turns { rectangle.centre } else { centre };
         let start = model.start(at, rectangle.yaw);
         Some((rough_cost(&model, evidence, &start), model, start))
@@ -99,15 +115,11 @@ fn best_fit<'a>(
     let mut starts: Vec<_> = rectangles.iter().filter_map(start_at).collect();
     starts.sort_by(|a, b| a.0.total_cmp(&b.0));
     let turns = starts.first().is_some_and(|(_, model, _)| model.turns);
-    // Several starts are brought near a minimum; only the best of them is fitted to the end.
     let near = starts.into_iter().take(if turns { STARTS } else { 1 }).map(|(_, model, start)| {
         let state = approach(&model, evidence, &start);
-        (cost(&model, evidence, &state), model, state)
+        Approach { cost: cost(&model, evidence, &state), model, state }
     });
-    let (_, model, state) = near.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    let minimum = minimise(&model, evidence, &state);
-    let minimum = canonical(&model, minimum, evidence)?;
-    Some((model, minimum))
+    near.min_by(|a, b| a.cost.total_cmp(&b.cost))
 }
 
 /// The remembered part with its remembered parameters, moved to where the evidence is: what is seen of it may be

@@ -10,6 +10,7 @@ use crate::{
 };
 use acm_concept::{solid::PlacedSolid, template::SeenBy};
 use glam::DVec2;
+use std::collections::BTreeSet;
 
 /// Most joins in one frame.
 const MAX_JOINS: usize = 24;
@@ -26,6 +27,11 @@ struct Piece {
 }
 
 impl Piece {
+    fn measure(scene: &Scene, segments: &Segments, label: u32, pixels: Vec<usize>) -> Option<Piece> {
+        let evidence = Evidence::of_segment(scene, segments, &pixels);
+        let (top_m, lowest_m) = (evidence.top_m(), scene.lowest_m(&pixels));
+        (!evidence.points.is_empty()).then_some(Piece { label, pixels, evidence, top_m, lowest_m })
+    }
     /// Share of the surface points near the top: large where a top face is seen, small on a wall.
     fn top_share(&self) -> f64 {
         let near = |p: &&crate::fit::SurfacePoint| p.position.z > self.top_m - 0.008;
@@ -34,53 +40,86 @@ impl Piece {
 }
 
 /// How two pieces belong together.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Relation {
+    /// The second is no thing at all.
+    Artefact,
+    /// The second is the floor of the hollow first.
+    Floor,
     /// The second is more of the first's outer surface.
     Surface,
     /// The second is the inside of the first.
     Inside,
-    /// The second is no thing at all.
-    Artefact,
+    /// The second is the far end of the first.
+    OtherEnd,
 }
 
 /// Joins pieces until no two belong together.
 pub(crate) fn join(scene: &Scene, segments: &mut Segments, context: Context) {
+    let mut pieces: Vec<Piece> = (0..segments.count as u32)
+        .zip(segments.pixels())
+        .filter_map(|(label, pixels)| Piece::measure(scene, segments, label, pixels))
+        .collect();
+    // Pairs that the costly tests refused: asked again only when one of them has changed.
+    let mut refused: BTreeSet<(Relation, u32, u32)> = BTreeSet::new();
     for _ in 0..MAX_JOINS {
-        let pieces = pieces(scene, segments);
-        let pair = |relation: Relation, test: &dyn Fn(&Piece, &Piece) -> bool| {
-            let others = |a: &Piece| pieces.iter().find(|b| b.label != a.label && test(a, b)).map(|b| b.label);
-            pieces.iter().find_map(|a| others(a).map(|b| (a.label, b, relation)))
-        };
-        let found = pair(Relation::Artefact, &is_ramp_of)
-            .or_else(|| pair(Relation::Inside, &is_floor_of))
-            .or_else(|| pair(Relation::Surface, &|a, b| is_fragment_of(scene, a, b)))
-            .or_else(|| pair(Relation::Inside, &|a, b| is_inside_of(scene, segments, context, a, b)))
-            .or_else(|| pair(Relation::Surface, &|a, b| is_other_end(scene, segments, context, a, b)));
-        let Some((first, second, relation)) = found else { return };
+        let Some((first, second, relation)) = related(scene, segments, context, &pieces, &mut refused) else { return };
+        let name = if relation == Relation::Artefact { NONE } else { first };
         for (label, inner) in segments.labels.iter_mut().zip(&mut segments.inner).filter(|(l, _)| **l == second) {
-            *label = if relation == Relation::Artefact { NONE } else { first };
-            *inner |= relation == Relation::Inside;
+            *label = name;
+            *inner |= matches!(relation, Relation::Inside | Relation::Floor);
+        }
+        refused.retain(|(_, a, b)| ![first, second].contains(a) && ![first, second].contains(b));
+        let mut joined = Vec::new();
+        for piece in pieces.extract_if(.., |p| p.label == second || p.label == name) {
+            joined.extend(piece.pixels);
+        }
+        for point in pieces.iter_mut().flat_map(|p| &mut p.evidence.outline).filter(|p| p.beyond == second) {
+            point.beyond = name;
+        }
+        if name != NONE {
+            joined.sort_unstable();
+            pieces.extend(Piece::measure(scene, segments, first, joined));
         }
     }
+}
+
+/// The first two pieces that belong together, and how.
+fn related(
+    scene: &Scene,
+    segments: &Segments,
+    context: Context,
+    pieces: &[Piece],
+    refused: &mut BTreeSet<(Relation, u32, u32)>,
+) -> Option<(u32, u32, Relation)> {
+    let relations = [Relation::Artefact, Relation::Floor, Relation::Surface, Relation::Inside, Relation::OtherEnd];
+    for relation in relations {
+        for (a, b) in pieces.iter().flat_map(|a| pieces.iter().map(move |b| (a, b))).filter(|(a, b)| a.label != b.label)
+        {
+            let key = (relation, a.label, b.label);
+            if refused.contains(&key) {
+                continue;
+            }
+            let holds = match relation {
+                Relation::Artefact => is_ramp_of(a, b),
+                Relation::Floor => is_floor_of(a, b),
+                Relation::Surface => is_fragment_of(scene, a, b),
+                Relation::Inside => is_inside_of(scene, segments, context, a, b),
+                Relation::OtherEnd => is_other_end(scene, segments, context, a, b),
+            };
+            if holds {
+                return Some((a.label, b.label, relation));
+            }
+            refused.insert(key);
+        }
+    }
+    None
 }
 
 /// Whether `ramp` is the smooth rise that a depth camera draws at the foot of `whole`.
 fn is_ramp_of(whole: &Piece, ramp: &Piece) -> bool {
     let touches = ramp.evidence.border_share(whole.label, &[OutlineKind::Contact, OutlineKind::Cut]);
     touches > 0.2 && ramp.top_m < 0.014_f64.min(0.3 * whole.top_m) && ramp.pixels.len() * 10 < whole.pixels.len()
-}
-
-fn pieces(scene: &Scene, segments: &Segments) -> Vec<Piece> {
-    let of_label = |(label, pixels): (usize, Vec<usize>)| {
-        let evidence = Evidence::of_segment(scene, segments, &pixels);
-        if pixels.is_empty() || evidence.points.is_empty() {
-            return None;
-        }
-        let (top_m, lowest_m) = (evidence.top_m(), scene.lowest_m(&pixels));
-        Some(Piece { label: label as u32, pixels, evidence, top_m, lowest_m })
-    };
-    segments.pixels().into_iter().enumerate().filter_map(of_label).collect()
 }
 
 /// Whether `floor` lies within `outer`: bordered by it nearly all round, by nothing farther, and lower.

@@ -46,7 +46,7 @@ pub(crate) fn find(scan: &Scan, excluded: &[bool], upright: Upright, config: &Gr
         return None;
     }
     let mut candidates = draw(&coarse, upright, config);
-    candidates.sort_by(|a, b| b.0.cmp(&a.0));
+    candidates.sort_by_key(|(score, _)| std::cmp::Reverse(*score));
     let (mut best, mut best_size) = (None, 0);
     for (_, plane) in candidates.into_iter().take(12) {
         let refined = refine(&coarse, plane, upright);
