@@ -1,7 +1,8 @@
 //! `press-down`: press a part straight down with closed fingers and let it spring back.
 //!
 //! Arguments: `stroke`, how far it may have to travel, metres; `force`, at which it is taken to be at its end,
-//! newtons. The frame lies on the surface that is pressed.
+//! newtons. The frame lies on the surface that is pressed. A thing that pushes back with less than about a newton is
+//! not felt to give way.
 
 use super::{PERCEPTION_ERROR_M, ROOMY_M, argument, require_empty_hand, within_ceiling};
 use crate::{

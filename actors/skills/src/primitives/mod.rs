@@ -22,9 +22,9 @@ use std::collections::VecDeque;
 /// A filtered force beyond this while nothing should touch the hand is a collision, newtons.
 const COLLISION_N: f64 = 30.0;
 /// How long the hand stands still before its wrist's zero is taken, seconds.
-const REST_S: f64 = 0.12;
+const REST_S: f64 = 0.14;
 /// Readings that make a new zero.
-const BASELINE_READINGS: usize = 4;
+const BASELINE_READINGS: usize = 6;
 /// How near the measured TCP must come to the commanded one, metres and radians.
 const ARRIVED_M: f64 = 0.003;
 const ARRIVED_RAD: f64 = 0.035;

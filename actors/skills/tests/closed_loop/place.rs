@@ -1,7 +1,7 @@
 //! `place-upright`, after a grasp.
 
 use super::*;
-use acm_concept::{embodiment::Feedback, skill::FailureCause};
+use acm_concept::{embodiment::Feedback, primitive::Primitive, skill::FailureCause};
 use proptest::prelude::*;
 
 const CUBE: DVec3 = DVec3::splat(0.04);
@@ -49,9 +49,11 @@ fn a_block_that_is_lost_on_the_way_is_missed_at_once() {
     let destination = table_pose(-0.2, -0.1, 0.0);
     let (world, held) = picked(0.0, 0.0);
     let whole = run(&mut world.clone(), &place(held, destination));
-    let ticks = (whole.ended.seconds_since(whole.started) / 0.02) as usize;
+    // A theft at the moment of letting go cannot be felt; one a fifth of a second before must be.
+    let release = whole.primitives.iter().find(|report| report.primitive == Primitive::Release).unwrap();
+    let ticks = (release.started.seconds_since(whole.started) / 0.02) as usize - 10;
     let mut missed = 0;
-    for stolen_at in (1..ticks).step_by(7) {
+    for stolen_at in (1..ticks).step_by(3) {
         let mut world = world.clone();
         let mut before: Option<Feedback> = None;
         let report = run_with(&mut world, &place(held, destination), |world, tick| {
@@ -69,7 +71,7 @@ fn a_block_that_is_lost_on_the_way_is_missed_at_once() {
         assert!(world.feedback().tcp.translation.z > TABLE_M + 0.06);
         missed += 1;
     }
-    assert!(missed > 15, "only {missed} thefts were tried");
+    assert!(missed > 25, "only {missed} thefts were tried");
 }
 
 #[test]
@@ -93,7 +95,7 @@ fn neighbours_keep_the_fingers_narrow_until_the_hand_is_above_them() {
     assert_eq!(report.failure, None);
     for command in &world.commands[from..] {
         let low = command.tcp.translation.z < TABLE_M + 0.05;
-        assert!(!low || command.opening_m < 0.04 + 0.021, "the fingers opened into a neighbour");
+        assert!(!low || command.opening_m < 0.052, "the fingers opened into a neighbour");
     }
     assert_eq!(world.feedback().commanded_opening_m, 0.08);
 }

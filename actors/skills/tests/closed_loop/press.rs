@@ -20,7 +20,7 @@ proptest! {
     #[test]
     fn a_button_is_pressed_once_and_springs_back(
         x in -0.4..0.4f64, y in -0.3..0.15f64, dx in -0.012..0.012f64, dz in -0.015..0.015f64,
-        preload in 0.8..3.0f64, spring in 50.0..1000.0f64, stroke in 0.0055..0.01f64,
+        preload in 1.2..3.0f64, spring in 50.0..1000.0f64, stroke in 0.0055..0.01f64,
     ) {
         let truth = Button { preload_n: preload, spring_n_m: spring, stroke_m: stroke, ..button(DVec2::new(x, y)) };
         let mut world = World::with_button(truth);
