@@ -1,6 +1,7 @@
 //! One episode of a scenario, and the handles through which an agent lives in it.
 
 use crate::{
+    body::Body,
     oracle::OracleVerdict,
     report::{Preview, SimError, SimOptions, SimTimings, TrueObject},
     scenario::{Scenario, TaskTemplate},
@@ -127,15 +128,14 @@ impl Simulation {
     /// Equal for equal start worlds: where which solids are, to 0.1 mm and 0.01 rad, whatever their names.
     pub fn world_digest(&self) -> String {
         let world = self.world();
-        let mut lines: Vec<String> = world
-            .bodies
-            .iter()
-            .map(|body| {
-                let at = (body.start.translation * 1e4).round();
-                let size = (body.placed.size() * 1e4).round();
-                format!("{at} {:.2} {size} {:?}", body.start.yaw() + 0.0, body.placed.solids.first().map(|s| s.color))
-            })
-            .collect();
+        // Whole numbers: a rounded float could still be a negative zero.
+        let rounded = |v: glam::DVec3| (v * 1e4).round().as_i64vec3();
+        let line = |body: &Body| {
+            let yaw = (body.start.yaw() * 1e2).round() as i64;
+            let color = body.placed.solids.first().map(|solid| solid.color);
+            format!("{} {yaw} {} {color:?}", rounded(body.start.translation), rounded(body.placed.size()))
+        };
+        let mut lines: Vec<String> = world.bodies.iter().map(line).collect();
         lines.sort();
         format!("{:016x}", fnv(lines.join("\n").bytes()))
     }

@@ -27,7 +27,7 @@ impl PhysicsProfile {
         IntegrationParameters {
             dt: self.step_s() as f32,
             // Many short substeps with few inner iterations hold a grip better than few with many: what is held for
-            // 5 s turns by 0.4 mrad with 8 x 2, by 12 mrad with 4 x 4, at 1.5 times the cost.
+            // 5 s tilts by 0.4 mrad with 8 x 2, by 12 mrad with 4 x 4, at 1.5 times the cost.
             num_solver_iterations: SUBSTEPS,
             num_internal_pgs_iterations: 2,
             friction_in_bias_pass: true,

@@ -81,7 +81,7 @@ pub enum SimError {
         /// The seed.
         seed: u64,
         /// Why not.
-        source: LayoutError,
+        source: Box<LayoutError>,
     },
     /// An object did not stay where it was placed.
     #[error(

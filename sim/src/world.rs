@@ -59,7 +59,7 @@ impl World {
         let layout = Layout::draw(&scenario.world, options.seed).map_err(|source| SimError::Layout {
             scenario: scenario.name.clone(),
             seed: options.seed,
-            source,
+            source: source.into(),
         })?;
         let mut world = World::build(scenario, options, &layout)?;
         world.settle(options.seed)?;
@@ -81,8 +81,11 @@ impl World {
         let robot = gripper::description(spec.home, spec.workspace);
         let gripper = Gripper::build(&mut physics, &robot);
         let variables = state::names(scenario);
-        let layout_error =
-            |source: LayoutError| SimError::Layout { scenario: scenario.name.clone(), seed: options.seed, source };
+        let layout_error = |source: LayoutError| SimError::Layout {
+            scenario: scenario.name.clone(),
+            seed: options.seed,
+            source: source.into(),
+        };
         let events = event::build(spec, layout, &variables).map_err(layout_error)?;
         Ok(World {
             bystanders: bystanders(spec, &scenario.judge, &bodies),

@@ -98,3 +98,23 @@ fn the_hand_goes_where_it_is_told() {
     assert!((feedback.opening_m - 0.05).abs() < 5e-4, "{feedback:?}");
     assert!(world.wait_until(Time::from_seconds(1e6)).is_err());
 }
+
+/// The engine's settings must let things stand on each other.
+#[test]
+fn a_tower_stands() {
+    let mut text = "[[object]]\nname = \"floor_0\"\nmodel = \"red-cube\"\nposition = [-0.1, 0.1, 0.74]\n".to_string();
+    for floor in 1..5 {
+        let below = floor - 1;
+        let block = format!(
+            "[[object]]\nname = \"floor_{floor}\"\nmodel = \"red-cube\"\non = {{ object = \"floor_{below}\" }}\n"
+        );
+        text.push_str(&block);
+    }
+    let mut world = World::new(&scenario_with(&format!("{text}\n[judge]\n")), &SimOptions::default()).unwrap();
+    world.wait_until(Time::from_seconds(5.0)).unwrap();
+    for object in world.truth().iter().filter(|object| object.name.starts_with("floor_")) {
+        let floor: f64 = object.name.trim_start_matches("floor_").parse().unwrap();
+        let error = object.pose.translation.distance(DVec3::new(-0.1, 0.1, 0.74 + 0.04 * floor));
+        assert!(error < 0.001, "{}: {error} m", object.name);
+    }
+}
