@@ -56,12 +56,20 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<Exit> {
     writeln!(out, "2 REMEMBERED  read back from {} by itself", memory.display())?;
     remembered(&runner, &memory, &mut out)?;
     let verdict = word(told.verdict.strict);
-    writeln!(out, "3 JUDGE     the simulator's truth, never shown to the robot: {verdict}; {}", told.verdict.explanation)?;
+    writeln!(
+        out,
+        "3 JUDGE     the simulator's truth, never shown to the robot: {verdict}; {}",
+        told.verdict.explanation
+    )?;
 
     writeln!(out, "4 NOW WITHOUT MEMORY  same robot, same eyes, same planner; memory wiped after the first placing")?;
     let wiped = without_memory(&runner, &scenario, args.seed)?;
     let honest = matches!(wiped.report.ending, Ending::GaveUp { .. });
-    writeln!(out, "            {}", if honest { "HONEST FAILURE: it says so and leaves the block alone" } else { "NOT HONEST" })?;
+    writeln!(
+        out,
+        "            {}",
+        if honest { "HONEST FAILURE: it says so and leaves the block alone" } else { "NOT HONEST" }
+    )?;
 
     let picture = picture(&runner, &listener, &tap, &args.out)?;
     more_seeds(&runner, &scenario, args.seed, began, &mut out)?;
@@ -85,8 +93,7 @@ fn fresh_memory(out: &Path) -> anyhow::Result<std::path::PathBuf> {
 
 fn without_memory(runner: &Runner, scenario: &Scenario, seed: u64) -> anyhow::Result<EpisodeResult> {
     let wipe = Injection::WipeMemory(WipeAt::FirstVerified("place".into()));
-    let config =
-        EpisodeConfig { method: "acm".into(), faults: Faults::new(&[wipe]), ..EpisodeConfig::default() };
+    let config = EpisodeConfig { method: "acm".into(), faults: Faults::new(&[wipe]), ..EpisodeConfig::default() };
     let narrator = Arc::new(Narrator::new(Box::new(std::io::stdout())).from_first_fault());
     runner.run(scenario, seed, &config, narrator)
 }
@@ -167,7 +174,10 @@ fn more_seeds(
         without += solved("reactive")?;
     }
     if asked > 0 {
-        writeln!(out, "            {asked} more seeds: with memory {with}/{asked}, last frame only and guessing {without}/{asked}")?;
+        writeln!(
+            out,
+            "            {asked} more seeds: with memory {with}/{asked}, last frame only and guessing {without}/{asked}"
+        )?;
     }
     Ok(())
 }

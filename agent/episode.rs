@@ -202,7 +202,9 @@ fn blame(report: &EpisodeReport, verdict: &OracleVerdict) -> GiveUpCause {
     match &report.ending {
         Ending::GaveUp { cause, .. } => *cause,
         Ending::NotUnderstood { .. } => GiveUpCause::Plan,
-        _ => report.cause().unwrap_or(if verdict.violations.is_empty() { GiveUpCause::Place } else { GiveUpCause::Plan }),
+        _ => {
+            report.cause().unwrap_or(if verdict.violations.is_empty() { GiveUpCause::Place } else { GiveUpCause::Plan })
+        }
     }
 }
 

@@ -26,16 +26,15 @@ impl FromStr for Injection {
         match text.split_once('@') {
             None if text == "black-frames" => Ok(Injection::BlackFrames),
             None if text == "freeze-frames" => Ok(Injection::FreezeFrames),
-            Some(("wipe-memory", event)) => {
-                event.parse().map(Injection::WipeMemory).map_err(|e: acm_actors::episode::ParseEventError| e.to_string())
-            }
+            Some(("wipe-memory", event)) => event
+                .parse()
+                .map(Injection::WipeMemory)
+                .map_err(|e: acm_actors::episode::ParseEventError| e.to_string()),
             Some(("slip", carry)) => match carry.parse() {
                 Ok(carry) if carry > 0 => Ok(Injection::Slip(carry)),
                 _ => Err(format!("`{carry}` is no number of a carry: write slip@1 for the first")),
             },
-            _ => Err(format!(
-                "`{text}` is no fault: black-frames, freeze-frames, wipe-memory@EVENT or slip@N"
-            )),
+            _ => Err(format!("`{text}` is no fault: black-frames, freeze-frames, wipe-memory@EVENT or slip@N")),
         }
     }
 }

@@ -87,7 +87,10 @@ impl Told {
                 vec![format!("act       {ended}  {}", verdict_words(verdict))]
             }
             Message::ActorFailed { role, reason, restarted } => {
-                vec![format!("fault     actor {role} failed ({reason}); {}", if *restarted { "restarted" } else { "not restarted" })]
+                vec![format!(
+                    "fault     actor {role} failed ({reason}); {}",
+                    if *restarted { "restarted" } else { "not restarted" }
+                )]
             }
             Message::Ended(report) => vec![format!("end       {}", crate::run::ending_words(&report.ending))],
             _ => Vec::new(),
@@ -101,7 +104,9 @@ impl Told {
             let place = place_words(object);
             match self.places.insert(object.id, place.clone()) {
                 None => lines.push(format!("saw       {} {} {place}", object.id, looks(object))),
-                Some(before) if before != place => lines.push(format!("saw       {} {} now {place}", object.id, object.category)),
+                Some(before) if before != place => {
+                    lines.push(format!("saw       {} {} now {place}", object.id, object.category))
+                }
                 Some(_) => {}
             }
         }

@@ -86,7 +86,12 @@ fn print_text(percepts: &Percepts, ids: &[Option<ObjectId>], library: &TemplateL
     if let Some(blindness) = percepts.blindness {
         writeln!(out, "nothing can be grounded: {blindness:?} ({:.0} % depth)", 100.0 * percepts.depth_fraction)?;
     }
-    writeln!(out, "{} objects; depth on {:.0} % of the pixels", percepts.objects.len(), 100.0 * percepts.depth_fraction)?;
+    writeln!(
+        out,
+        "{} objects; depth on {:.0} % of the pixels",
+        percepts.objects.len(),
+        100.0 * percepts.depth_fraction
+    )?;
     for (object, id) in percepts.objects.iter().zip(ids) {
         let name = id.map_or_else(|| "-".into(), |id| id.to_string());
         writeln!(out, "{name:<4} {}", describe(object, library))?;
@@ -146,10 +151,7 @@ fn print_json(percepts: &Percepts, ids: &[Option<ObjectId>], library: &TemplateL
             Line { id, category: &pair.0.category, summary }
         })
         .collect();
-    serde_json::to_writer_pretty(
-        std::io::stdout().lock(),
-        &Perceived { schema: "acm.perceive/1", objects, percepts },
-    )?;
+    serde_json::to_writer_pretty(std::io::stdout().lock(), &Perceived { schema: "acm.perceive/1", objects, percepts })?;
     println!();
     Ok(())
 }

@@ -71,7 +71,7 @@ fn many(runner: &Runner, scenario: &Scenario, args: &RunArgs, config: &EpisodeCo
     let mut results = Vec::new();
     for seed in args.seed.first..=args.seed.last {
         let result = runner.run(scenario, seed, config, Arc::new(NoJournal))?;
-        bar.println(line(&result));
+        tell(&bar, args.json, &line(&result))?;
         bar.inc(1);
         let interrupted = result.report.ending == Ending::Interrupted;
         results.push(result);
@@ -92,7 +92,15 @@ fn many(runner: &Runner, scenario: &Scenario, args: &RunArgs, config: &EpisodeCo
     Ok(exit_of_range(&results, count as usize))
 }
 
-/// Lines go to standard error, so that JSON on standard output stays clean.
+/// One line an episode: above the bar on a terminal, on standard output elsewhere; none with JSON.
+fn tell(bar: &ProgressBar, json: bool, line: &str) -> anyhow::Result<()> {
+    if json {
+        return Ok(());
+    }
+    bar.suspend(|| writeln!(std::io::stdout().lock(), "{line}"))?;
+    Ok(())
+}
+
 fn progress(count: u64, hidden: bool) -> ProgressBar {
     if hidden {
         return ProgressBar::hidden();
@@ -206,7 +214,10 @@ fn print_summary(runs: &Runs<'_>, asked: usize) -> anyhow::Result<()> {
     let wall: Vec<f64> = runs.episodes.iter().map(|e| e.wall_s).collect();
     let frames: Vec<f64> = runs.episodes.iter().map(|e| f64::from(e.report.frames_perceived)).collect();
     let ((wall50, wall_max), (frames50, frames_max)) = (median_and(1.0, &wall), median_and(1.0, &frames));
-    writeln!(out, "  wall per episode: median {wall50:.1} s, longest {wall_max:.1} s; frames perceived: median {frames50:.0}, most {frames_max:.0}")?;
+    writeln!(
+        out,
+        "  wall per episode: median {wall50:.1} s, longest {wall_max:.1} s; frames perceived: median {frames50:.0}, most {frames_max:.0}"
+    )?;
     Ok(())
 }
 

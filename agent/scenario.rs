@@ -40,7 +40,8 @@ fn preview(file: &str, seed: u64, out: &Path, info: bool) -> anyhow::Result<()> 
     simulation
         .preview(None)?
         .color
-        .save(out).with_context(|| format!("the picture {} cannot be written", out.display()))?;
+        .save(out)
+        .with_context(|| format!("the picture {} cannot be written", out.display()))?;
     println!("{} seed {seed} -> {}", scenario.name(), out.display());
     if info {
         for object in simulation.truth() {

@@ -13,8 +13,7 @@ async fn main() -> anyhow::Result<()> {
     let library = Arc::new(acm_memory::default_library()?);
     let memory = Box::new(acm_memory::AcmMemory::in_memory(Arc::clone(&library)));
     let agent = Agent::builder(library, memory).build()?;
-    let run =
-        agent.run(world.task(), world.embodiment(), world.camera(), world.clock(), &Interrupt::default()).await?;
+    let run = agent.run(world.task(), world.embodiment(), world.camera(), world.clock(), &Interrupt::default()).await?;
 
     println!("told:  {}", world.task().instruction);
     for step in &run.report.steps {

@@ -194,9 +194,7 @@ impl Agent {
             .actor(EPISODE, Box::new(move || Box::new(Episode::new(task.clone(), wipe_at.clone()))))
             .actor(
                 HOST,
-                Box::new(move || {
-                    Box::new(HostPort::new(Arc::clone(&outside), camera.clone(), Arc::clone(&frames)))
-                }),
+                Box::new(move || Box::new(HostPort::new(Arc::clone(&outside), camera.clone(), Arc::clone(&frames)))),
             )
             .actor(
                 PERCEPTION,
@@ -209,7 +207,7 @@ impl Agent {
                 PLANNER,
                 Box::new(move || {
                     let (planner, library) = (Arc::clone(&planner), Arc::clone(&library));
-                    Box::new(PlannerActor::new(planner, library, plans.clone(), options.clone()))
+                    Box::new(PlannerActor::new(planner, library, plans.clone(), options))
                 }),
             )
             .actor(EXECUTOR, Box::new(move || Box::new(ExecutorActor::new(hands.clone()))))

@@ -19,8 +19,8 @@ use acm_runtime::{
     core::{Core, CoreError, Outbox},
     envelope::{Envelope, OUTSIDE},
 };
-pub use state::{ParseEventError, WipeAt};
 use state::{Doing, Pending};
+pub use state::{ParseEventError, WipeAt};
 
 /// How many frames may be taken to decide one verification.
 const MAX_VERIFY_LOOKS: u32 = 2;
@@ -206,7 +206,12 @@ impl Episode {
                     ended: Time::ZERO,
                     failure: None,
                     outcome: None,
-                    entries_scored: explanation.references.iter().filter_map(|r| r.retrieval.as_ref()).map(|r| r.scored).sum(),
+                    entries_scored: explanation
+                        .references
+                        .iter()
+                        .filter_map(|r| r.retrieval.as_ref())
+                        .map(|r| r.scored)
+                        .sum(),
                     candidates_inspected: explanation.candidates_inspected,
                 });
                 self.step = Some((step, invocation.clone()));

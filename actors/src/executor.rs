@@ -41,15 +41,15 @@ enum Running {
 
 impl Running {
     /// The next command, or the message that ends the job.
-    fn tick(&mut self, feedback: &Feedback) -> Result<Command, Message> {
+    fn tick(&mut self, feedback: &Feedback) -> Result<Command, Box<Message>> {
         match self {
             Running::Skill(controller) => match controller.tick(feedback) {
                 Tick::Act(command) => Ok(command),
-                Tick::Finished(report) => Err(Message::SkillEnded(report)),
+                Tick::Finished(report) => Err(Box::new(Message::SkillEnded(report))),
             },
             Running::Retreat(retreat) => match retreat.tick(feedback) {
                 RetreatTick::Act(command) => Ok(command),
-                RetreatTick::Finished(report) => Err(Message::Retreated { failure: report.failure }),
+                RetreatTick::Finished(report) => Err(Box::new(Message::Retreated { failure: report.failure })),
             },
         }
     }
@@ -88,7 +88,7 @@ impl ExecutorActor {
                 self.work = Some(work);
                 outbox.send(HOST, Message::Command(command));
             }
-            Err(end) => outbox.send(EPISODE, end),
+            Err(end) => outbox.send(EPISODE, *end),
         }
         Ok(())
     }

@@ -1,10 +1,6 @@
 //! What an episode came to.
 
-use acm_concept::{
-    ids::ObjectId,
-    skill::FailureCause,
-    time::Time,
-};
+use acm_concept::{ids::ObjectId, skill::FailureCause, time::Time};
 use acm_memory::observation::Outcome;
 use acm_planner::GiveUpCause;
 use serde::Serialize;

@@ -8,7 +8,7 @@
 //! | module | holds |
 //! |---|---|
 //! | [`config`], [`grounder`] | thresholds; the whole pipeline |
-//! | [`frames`], [`level`] | colour and depth files; the camera pose over the dominant plane when none is known |
+//! | [`frames`], [`level`](mod@level) | colour and depth files; the camera pose over the dominant plane when none is known |
 //! | `scan`, `support`, `scene`, `own` | pixels to points, the plane and its extent, heights, the robot's own pixels |
 //! | `segments`, `joins`, `patches` | what stands on the plane, what lies in it |
 //! | `measure`, `fit`, `hypotheses` | first guesses, template fits, the choice among templates |

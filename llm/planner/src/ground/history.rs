@@ -8,7 +8,7 @@ use crate::{
 };
 use acm_concept::{
     ids::{ObjectId, TransitionId},
-    literal::Place,
+    literal::{Evidence, Place},
     pose::Pose,
     task::OnUnknown,
 };
@@ -64,9 +64,14 @@ impl Grounder<'_> {
         let instructed = self.view.progress().instructed;
         let transition =
             own.and_then(|id| self.view.transitions().iter().find(|t| t.id == id && t.moment >= instructed));
-        let made_for = transition.and_then(|transition| transition.subtask);
+        // Only an answer that rests on that move is no answer: a place that a frame shows stands by itself.
+        let made_for = |evidence: &[Evidence]| {
+            transition.filter(|t| evidence.contains(&Evidence::Transition(t.id))).and_then(|t| t.subtask)
+        };
         match recall {
-            Recall::Known { .. } if reference == PlaceReference::BeforeMoved && made_for == Some(subtask) => {
+            Recall::Known { ref evidence, .. }
+                if reference == PlaceReference::BeforeMoved && made_for(evidence) == Some(subtask) =>
+            {
                 let reason = format!("I moved {object} only for this, and saw no move before");
                 Recall::Unknown { reason, candidates: Vec::new() }
             }
