@@ -3,10 +3,10 @@
 //!
 //! `cargo run --release -p acm-perception --example time_tabletop -- LIBRARY_FOLDER [WORLDS]`
 
-#[allow(dead_code)] // The tests use more of it.
+#[allow(dead_code, clippy::unwrap_used)] // The tests use more of it, and a failed unwrap fails them.
 #[path = "../tests/tabletop/sensor.rs"]
 mod sensor;
-#[allow(dead_code)]
+#[allow(dead_code, clippy::unwrap_used)]
 #[path = "../tests/tabletop/world.rs"]
 mod world;
 
@@ -66,7 +66,7 @@ fn jittered(random: &mut ChaCha8Rng) -> (World, Vec<DVec2>, DVec2) {
     let centre = DVec2::new(0.1 + random.random_range(-0.02..0.02), -0.1);
     loop {
         let count = random.random_range(3..=6);
-        let (radius, turn) = (random.random_range(0.1..0.14), random.random_range(0.0..6.28));
+        let (radius, turn) = (random.random_range(0.1..0.14), random.random_range(0.0..std::f64::consts::TAU));
         let place = |i: i32, random: &mut ChaCha8Rng| {
             let angle = turn + f64::from(i) * std::f64::consts::TAU / f64::from(count);
             let shift = DVec2::new(random.random_range(-0.03..0.03), random.random_range(-0.03..0.03));

@@ -75,9 +75,14 @@ fn noise_m(scene: &Scene, pixel: usize) -> f32 {
     (scene.noise_ratio * scene.config.depth_sigma_m(f64::from(scene.scan.smooth[pixel]))) as f32
 }
 
+/// Half width of the differences that normals are taken from, pixels: wider the noisier the frame.
+fn normal_reach(scene: &Scene) -> isize {
+    (2.0 + 3.0 * scene.noise_ratio).round().clamp(3.0, 6.0) as isize
+}
+
 /// Unit normals towards the camera by differences over a few pixels, wider the noisier the frame; zero where unknown.
 fn normals(scene: &Scene) -> Vec<Vec3> {
-    let reach = (2.0 + 3.0 * scene.noise_ratio).round().clamp(3.0, 6.0) as isize;
+    let reach = normal_reach(scene);
     let eye = scene.camera.translation.as_vec3();
     let mut normals = vec![Vec3::ZERO; scene.grid.len()];
     let near = scene.grid.dilate(&scene.rising, 2);
@@ -126,6 +131,12 @@ fn jumps(scene: &Scene, normals: &[Vec3]) -> Vec<bool> {
 /// Pixels at which the surface bends inwards, in a row or in a column.
 fn bends(scene: &Scene, normals: &[Vec3]) -> Vec<bool> {
     let step = BEND_STEP as isize;
+    let focal = scene.scan.intrinsics.fx as f32;
+    // Error of a normal's slope: the noise over the width that it was taken from.
+    let slope_sigma = |index: usize| {
+        let width_m = 2.0 * normal_reach(scene) as f32 * scene.scan.smooth[index] / focal;
+        1.4 * noise_m(scene, index) / width_m.max(1e-4)
+    };
     let inwards = |index: usize, dx: isize, dy: isize| {
         let (Some(a), Some(b)) =
             (scene.grid.offset(index, -dx * step, -dy * step), scene.grid.offset(index, dx * step, dy * step))
@@ -139,7 +150,7 @@ fn bends(scene: &Scene, normals: &[Vec3]) -> Vec<bool> {
         let across = scene.point[b] - scene.point[a];
         let length = across.length();
         let turn = (nb - na).dot(across) / (length + 1e-9);
-        turn < -0.3 && na.dot(nb) < 0.88 && length < 0.06
+        turn < -0.3 - 1.5 * (slope_sigma(index) - 0.2).max(0.0) && na.dot(nb) < 0.88 && length < 0.06
     };
     (0..scene.grid.len()).map(|i| scene.rising[i] && (inwards(i, 1, 0) || inwards(i, 0, 1))).collect()
 }
