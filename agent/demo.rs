@@ -41,9 +41,8 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<Exit> {
     let memory = fresh_memory(&args.out)?;
     let mut out = std::io::stdout();
     let adapter = runner.adapter();
-    writeln!(out, "ACM demo   no GPU, no key, no network at run time   renderer: {adapter}   seed {}", args.seed)?;
-
-    writeln!(out, "1 THE TASK  {}", scenario.summary())?;
+    writeln!(out, "ACM demo   no GPU, no key, no network at run time   seed {}   {adapter}", args.seed)?;
+    writeln!(out, "1 SEE, DECIDE, ACT, VERIFY   the robot gets noisy RGB-D frames and one instruction")?;
     let tap = FrameTap::first(1);
     let listener = Arc::new(Listener { narrator: Narrator::new(Box::new(std::io::stdout())), first: Mutex::default() });
     let config = EpisodeConfig {
@@ -53,27 +52,27 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<Exit> {
         ..EpisodeConfig::default()
     };
     let told = runner.run(&scenario, args.seed, &config, Arc::clone(&listener) as Arc<dyn Journal<Message>>)?;
-    writeln!(out, "2 REMEMBERED  read back from {} by itself", memory.display())?;
+    writeln!(out, "2 REMEMBER   read back from {}, as the next run would", memory.display())?;
     remembered(&runner, &memory, &mut out)?;
     let verdict = word(told.verdict.strict);
     writeln!(
         out,
-        "3 JUDGE     the simulator's truth, never shown to the robot: {verdict}; {}",
+        "3 JUDGE   the simulator's truth, never shown to the robot: {verdict}; {}",
         told.verdict.explanation
     )?;
 
-    writeln!(out, "4 NOW WITHOUT MEMORY  same robot, same eyes, same planner; memory wiped after the first placing")?;
+    writeln!(out, "4 NOW WITHOUT MEMORY   same robot, eyes and planner; wiped after the first placing")?;
     let wiped = without_memory(&runner, &scenario, args.seed)?;
     let honest = matches!(wiped.report.ending, Ending::GaveUp { .. });
     writeln!(
         out,
-        "            {}",
-        if honest { "HONEST FAILURE: it says so and leaves the block alone" } else { "NOT HONEST" }
+        "          {}",
+        if honest { "HONEST FAILURE: it says what it does not know, and stops" } else { "NOT HONEST" }
     )?;
 
     let picture = picture(&runner, &listener, &tap, &args.out)?;
     more_seeds(&runner, &scenario, args.seed, began, &mut out)?;
-    writeln!(out, "Look at {}      Next: acm run {SCENARIO} --seed {}", picture.display(), args.seed + 1)?;
+    writeln!(out, "Look at {}   Next: acm run {SCENARIO} --seed {}", picture.display(), args.seed + 1)?;
     let exit = told.solved && honest;
     Ok(if exit { Exit::Success } else { Exit::Failed })
 }
@@ -112,7 +111,7 @@ fn remembered(runner: &Runner, memory: &Path, out: &mut impl Write) -> anyhow::R
         let grounds: Vec<String> = evidence.iter().map(evidence_words).collect();
         writeln!(
             out,
-            "            {} came from ({:.2}, {:.2}){on}, {confidence:.2}, by {}; {} transitions kept",
+            "          {} came from ({:.2}, {:.2}){on}, {confidence:.2}, by {}; {} transitions kept",
             object.id,
             at.x,
             at.y,
@@ -176,7 +175,7 @@ fn more_seeds(
     if asked > 0 {
         writeln!(
             out,
-            "            {asked} more seeds: with memory {with}/{asked}, last frame only and guessing {without}/{asked}"
+            "5 {asked} MORE SEEDS   with memory {with}/{asked}, last frame only and guessing {without}/{asked}"
         )?;
     }
     Ok(())

@@ -1,6 +1,6 @@
 //! The story of an episode, told from its messages as they are delivered.
 
-use acm_actors::message::Message;
+use acm_actors::{message::Message, report::Ending};
 use acm_concept::{ids::ObjectId, object::GroundedPart, skill::SkillReport};
 use acm_memory::{
     MemoryView,
@@ -32,12 +32,24 @@ struct Told {
     ended: Option<String>,
     /// Whether nothing is told yet.
     silent: bool,
+    /// The plan as it was last announced.
+    plan: Vec<String>,
+    gave_up: bool,
 }
 
 impl Narrator {
     /// A narrator that writes to `sink`.
     pub fn new(sink: Box<dyn Write + Send>) -> Narrator {
-        Narrator { told: Mutex::new(Told { sink, places: BTreeMap::new(), ended: None, silent: false }) }
+        Narrator {
+            told: Mutex::new(Told {
+                sink,
+                places: BTreeMap::new(),
+                ended: None,
+                silent: false,
+                plan: Vec::new(),
+                gave_up: false,
+            }),
+        }
     }
 }
 
@@ -77,7 +89,7 @@ impl Told {
                 self.places.clear();
                 vec!["fault     memory wiped: objects, places, moves and progress are gone; the task is not".into()]
             }
-            Message::Decided { decision, .. } => decision_lines(decision),
+            Message::Decided { decision, .. } => self.decision_lines(decision),
             Message::SkillEnded(report) => {
                 self.ended = Some(skill_words(report, at));
                 Vec::new()
@@ -87,42 +99,67 @@ impl Told {
                 vec![format!("act       {ended}  {}", verdict_words(verdict))]
             }
             Message::ActorFailed { role, reason, restarted } => {
-                vec![format!(
-                    "fault     actor {role} failed ({reason}); {}",
-                    if *restarted { "restarted" } else { "not restarted" }
-                )]
+                let outcome = if *restarted { "restarted" } else { "not restarted" };
+                vec![format!("fault     actor {role} failed ({reason}); {outcome}")]
             }
-            Message::Ended(report) => vec![format!("end       {}", crate::run::ending_words(&report.ending))],
+            Message::Ended(report) => match &report.ending {
+                Ending::Done => Vec::new(),
+                Ending::GaveUp { .. } if self.gave_up => Vec::new(),
+                other => vec![format!("end       {}", crate::run::ending_words(other))],
+            },
             _ => Vec::new(),
         }
     }
 
-    /// What changed since it was last told.
+    /// What changed since it was last told: new things by category, then each thing that is elsewhere.
     fn changes(&mut self, view: &dyn MemoryView) -> Vec<String> {
-        let mut lines = Vec::new();
+        let (mut new, mut moved): (BTreeMap<&str, Vec<&ObjectEntry>>, Vec<String>) = Default::default();
         for object in view.objects() {
             let place = place_words(object);
             match self.places.insert(object.id, place.clone()) {
-                None => lines.push(format!("saw       {} {} {place}", object.id, looks(object))),
+                None => new.entry(&object.category).or_default().push(object),
                 Some(before) if before != place => {
-                    lines.push(format!("saw       {} {} now {place}", object.id, object.category))
+                    moved.push(format!("saw       {} {} now {place}", object.id, object.category))
                 }
                 Some(_) => {}
             }
         }
-        lines
+        let group = |(category, objects): (&&str, &Vec<&ObjectEntry>)| {
+            let each: Vec<String> = objects.iter().map(|o| format!("{} {}", o.id, place_words(o))).collect();
+            let size = objects.first().and_then(|o| o.parts.first()).map(size_words).unwrap_or_default();
+            format!("saw       {} {category} {size}: {}", objects.len(), each.join(", "))
+        };
+        new.iter().map(group).chain(moved).collect()
+    }
+
+    /// A step that was announced as part of a plan is not announced again.
+    fn decision_lines(&mut self, decision: &Decision) -> Vec<String> {
+        match decision {
+            Decision::Act { step, explanation } => {
+                let announced = self.plan.get(1..).is_some_and(|rest| rest == explanation.plan);
+                self.plan.clone_from(&explanation.plan);
+                if announced && step.attempt == 0 {
+                    return Vec::new();
+                }
+                let past = explanation.references.iter().filter(|r| r.recall.is_some());
+                let past: String = past.map(|r| format!("; \"{}\" is {}", r.phrase, r.how)).collect();
+                vec![format!("decide    {}{past}", explanation.plan.join(", then "))]
+            }
+            Decision::Look { reason } => vec![format!("look      {reason}")],
+            Decision::SubtaskDone { index, reason } => vec![format!("done      subtask {}: {reason}", index + 1)],
+            Decision::Done { .. } => Vec::new(),
+            Decision::GiveUp { unknown } => {
+                self.gave_up = true;
+                vec![format!("give up   {}", unknown.text)]
+            }
+        }
     }
 }
 
-/// Category and size of an object.
-pub fn looks(object: &ObjectEntry) -> String {
-    let size = object.parts.first().map(size_words).unwrap_or_default();
-    format!("{} {size}", object.category)
-}
-
+/// The part's parameters in the order of its template, lengths in centimetres.
 fn size_words(part: &GroundedPart) -> String {
-    let numbers: Vec<String> = part.parameters.iter().map(|p| format!("{} {:.1}", p.name, 100.0 * p.value)).collect();
-    format!("({} cm)", numbers.join(", "))
+    let numbers: Vec<String> = part.parameters.iter().map(|p| format!("{:.1}", 100.0 * p.value)).collect();
+    format!("{} cm", numbers.join("x"))
 }
 
 fn place_words(object: &ObjectEntry) -> String {
@@ -132,32 +169,16 @@ fn place_words(object: &ObjectEntry) -> String {
         // To the centimetre: noise below that is no news.
         (_, Some(pose), support) => {
             let on = support.map_or(String::new(), |id| format!(" on {id}"));
-            format!("at ({:.2}, {:.2}){on}", pose.translation.x + 0.0, pose.translation.y + 0.0)
+            format!("({:.2}, {:.2}){on}", pose.translation.x + 0.0, pose.translation.y + 0.0)
         }
         (_, None, _) => "somewhere".into(),
     }
 }
 
-fn decision_lines(decision: &Decision) -> Vec<String> {
-    match decision {
-        Decision::Act { explanation, .. } => vec![format!("decide    {explanation}")],
-        Decision::Look { reason } => vec![format!("look      {reason}")],
-        Decision::SubtaskDone { index, reason } => vec![format!("done      subtask {}: {reason}", index + 1)],
-        Decision::Done { reason } => vec![format!("done      {reason}")],
-        Decision::GiveUp { unknown } => vec![format!("give up   {}", unknown.text)],
-    }
-}
-
 fn skill_words(report: &SkillReport, at_s: f64) -> String {
     let primitives: Vec<String> = report.primitives.iter().map(|p| p.primitive.to_string()).collect();
-    let measured: Vec<String> = report.measured.iter().map(|(name, value)| format!("{name} {value:.3}")).collect();
-    format!(
-        "{} {}: {} [{}] at {at_s:.1} s",
-        report.invocation.skill,
-        report.invocation.part.object,
-        primitives.join(", "),
-        measured.join(", ")
-    )
+    let invocation = &report.invocation;
+    format!("{} {}: {}, {at_s:.0} s", invocation.skill, invocation.part.object, primitives.join(", "))
 }
 
 fn verdict_words(verdict: &Verdict) -> String {

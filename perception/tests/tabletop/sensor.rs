@@ -47,7 +47,7 @@ impl Sensor {
             intrinsics: self.intrinsics,
             camera_pose: self.nominal,
         };
-        RgbdFrame::new(header, color.into(), depth.into()).unwrap()
+        RgbdFrame { header, color: color.into(), depth: depth.into() }
     }
 
     fn measure(&self, exact: &[f64], random: &mut ChaCha8Rng) -> Vec<f64> {

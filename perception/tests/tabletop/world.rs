@@ -124,7 +124,7 @@ fn normal(solid: &Solid, at: DVec3) -> DVec3 {
     match *solid {
         Solid::Box { size } => {
             let q = (at.abs() - size * 0.5).to_array();
-            let axis = (0..3).max_by(|&a, &b| q[a].total_cmp(&q[b])).unwrap();
+            let axis = (0..3).max_by(|&a, &b| q[a].total_cmp(&q[b])).unwrap_or(2);
             let mut normal = DVec3::ZERO;
             normal[axis] = at[axis].signum();
             normal
