@@ -20,10 +20,17 @@ fn main() -> ExitCode {
         Ok(exit) => exit.into(),
         Err(error) if is_broken_pipe(&error) => Exit::Success.into(),
         Err(error) => {
-            eprintln!("acm: {error:#}");
+            eprintln!("acm: {}", one_line(&format!("{error:#}")));
             Exit::Unusable.into()
         }
     }
+}
+
+/// A message on one line: what parsers print of the file itself, under a bar, is left out.
+fn one_line(message: &str) -> String {
+    let is_excerpt = |line: &str| line.trim_start_matches(|c: char| c.is_ascii_digit() || c == ' ').starts_with('|');
+    let lines: Vec<&str> = message.lines().map(str::trim).filter(|l| !l.is_empty() && !is_excerpt(l)).collect();
+    lines.join(": ")
 }
 
 /// A reader that has seen enough, such as `head`, is no failure.
