@@ -1,14 +1,14 @@
 //! Recalls places: now, before a move, at the start. What was neither seen nor done is unknown, and said so.
 
 use crate::{
-    entry::{Moment, ObjectEntry, Presence},
+    entry::{Moment, ObjectEntry, PlaceCause, Presence, Transition},
     geometry::{Body, symmetry, upright_motion},
     moves::{Departure, departures, evidence, first_departure},
     query::{PlaceReference, Recall},
     state::State,
 };
 use acm_concept::{
-    ids::ObjectId,
+    ids::{ObjectId, TransitionId},
     literal::{Evidence, Place},
     pose::Pose,
     template::TemplateLibrary,
@@ -99,7 +99,8 @@ fn now(entry: &ObjectEntry) -> Recall<Place> {
 
 fn before_moved(state: &State, library: &TemplateLibrary, entry: &ObjectEntry) -> Recall<Place> {
     let earlier = || departures(entry).last().map(|last| last.by.moment.episode);
-    let departure = first_departure(entry, state.next.episode)
+    let departure = moved_for_earlier_subtask(state, entry)
+        .or_else(|| first_departure(entry, state.next.episode))
         .or_else(|| earlier().and_then(|episode| first_departure(entry, episode)));
     match departure {
         Some(departure) => known(state, library, entry, &departure),
@@ -111,6 +112,20 @@ fn before_moved(state: &State, library: &TemplateLibrary, entry: &ObjectEntry) -
             candidates: free_places(state, library, entry),
         },
     }
+}
+
+/// The first departure that an earlier subtask of the running instruction brought about: "bring it here, ..., return
+/// it to where it came from" speaks of that move, whatever else moved the object before.
+fn moved_for_earlier_subtask<'e>(state: &State, entry: &'e ObjectEntry) -> Option<Departure<'e>> {
+    let (instructed, current) = (state.progress.instructed, state.progress.current());
+    let earlier = |id: TransitionId| {
+        let serves = |t: &Transition| t.id == id && t.moment >= instructed && t.subtask.is_some_and(|s| s < current);
+        state.transitions.iter().any(serves)
+    };
+    departures(entry).into_iter().find(|departure| match departure.by.cause {
+        PlaceCause::Own(id) | PlaceCause::Grasped(id) => earlier(id),
+        PlaceCause::Seen(_) | PlaceCause::Gone(_) => false,
+    })
 }
 
 fn at_start(state: &State, library: &TemplateLibrary, entry: &ObjectEntry) -> Recall<Place> {

@@ -8,6 +8,8 @@ use crate::{
     staging::{Thing, begin, gripping_hand, look, open_hand, report},
 };
 
+use acm_concept::time::Time;
+
 fn block(x: f64) -> Thing {
     Thing::block([0.04, 0.04, 0.04]).at(x, 0.0, 0.0).colored(RED)
 }
@@ -32,6 +34,28 @@ fn a_move_between_two_runs_is_remembered_and_a_later_run_without_one_asks_the_ea
     look(&mut memory, 0, 0.0, &[block(0.3)], &[], &open_hand(0.0)).unwrap();
     assert!(origin(&memory).is_some_and(|x| x.abs() < 0.005), "no move in this run: the last one counts");
     assert_eq!(truth(&memory, "moved(O1)"), Truth::No);
+}
+
+#[test]
+fn what_an_earlier_subtask_moved_came_from_where_it_was_before_that_subtask() {
+    let mut memory = memory();
+    for frame in 0..2 {
+        look(&mut memory, frame, 0.0, &[block(0.0)], &[], &open_hand(0.0)).unwrap();
+    }
+    begin(&mut memory).unwrap();
+    // Between the runs somebody moved it to 0.3: seen, but not what the instruction speaks of.
+    look(&mut memory, 0, 0.0, &[block(0.3)], &[], &open_hand(0.0)).unwrap();
+    memory.note(&Note::Instructed { time: Time::ZERO, text: "bring it here, then return it".into() }).unwrap();
+    let mut executed = report(&*memory.view(), "pick", ObjectId(1), 2.0).unwrap().holding();
+    executed.subtask = Some(0);
+    memory.record(&executed).unwrap();
+    let origin = |memory: &AcmMemory| match memory.view().recall_place(ObjectId(1), PlaceReference::BeforeMoved) {
+        Recall::Known { value, .. } => (value.pose.translation.x * 10.0).round() as i64,
+        unknown => panic!("{unknown:?}"),
+    };
+    assert_eq!(origin(&memory), 0, "while the subtask runs, the move before it counts");
+    memory.note(&Note::SubtaskDone { time: Time::from_seconds(3.0), index: 0 }).unwrap();
+    assert_eq!(origin(&memory), 3);
 }
 
 #[test]
