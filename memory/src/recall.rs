@@ -1,14 +1,14 @@
 //! Recalls places: now, before a move, at the start. What was neither seen nor done is unknown, and said so.
 
 use crate::{
-    entry::{Moment, ObjectEntry, PlaceCause, Presence, Transition},
+    entry::{Moment, ObjectEntry, Presence, Transition},
     geometry::{Body, symmetry, upright_motion},
     moves::{Departure, departures, evidence, first_departure},
     query::{PlaceReference, Recall},
     state::State,
 };
 use acm_concept::{
-    ids::{ObjectId, TransitionId},
+    ids::ObjectId,
     literal::{Evidence, Place},
     pose::Pose,
     template::TemplateLibrary,
@@ -114,18 +114,18 @@ fn before_moved(state: &State, library: &TemplateLibrary, entry: &ObjectEntry) -
     }
 }
 
-/// The first departure that an earlier subtask of the running instruction brought about: "bring it here, ..., return
-/// it to where it came from" speaks of that move, whatever else moved the object before.
+/// The first departure since an earlier subtask of the running instruction began to act on the object: "bring it
+/// here, ..., return it to where it came from" speaks of that move, whatever moved the object before. A grasp that
+/// lost the object on the way counts too.
 fn moved_for_earlier_subtask<'e>(state: &State, entry: &'e ObjectEntry) -> Option<Departure<'e>> {
     let (instructed, current) = (state.progress.instructed, state.progress.current());
-    let earlier = |id: TransitionId| {
-        let serves = |t: &Transition| t.id == id && t.moment >= instructed && t.subtask.is_some_and(|s| s < current);
-        state.transitions.iter().any(serves)
+    let serves = |t: &&Transition| {
+        t.object() == entry.id && t.moment >= instructed && t.subtask.is_some_and(|subtask| subtask < current)
     };
-    departures(entry).into_iter().find(|departure| match departure.by.cause {
-        PlaceCause::Own(id) | PlaceCause::Grasped(id) => earlier(id),
-        PlaceCause::Seen(_) | PlaceCause::Gone(_) => false,
-    })
+    let first = state.transitions.iter().find(serves)?;
+    // Time stands still while the agent thinks: what was seen at the very moment it began was seen before.
+    let began = Moment { time: first.report.started, ..first.moment };
+    departures(entry).into_iter().find(|departure| departure.by.moment > began)
 }
 
 fn at_start(state: &State, library: &TemplateLibrary, entry: &ObjectEntry) -> Recall<Place> {
