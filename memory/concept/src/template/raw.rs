@@ -98,6 +98,9 @@ fn zero() -> String {
     "0".into()
 }
 
+/// Names that the expression reader takes for numbers.
+const CONSTANTS: [&str; 6] = ["e", "E", "PI", "TAU", "π", "τ"];
+
 pub(super) fn parse(file: &str, text: &str) -> Result<Template, TemplateError> {
     let format = |reason: String| TemplateError::Format { file: file.into(), reason };
     if text.len() > MAX_TEMPLATE_BYTES {
@@ -129,6 +132,8 @@ impl Meaning<'_> {
             let reason = format!("prior {} must be a positive number", raw.prior);
             return Err(TemplateError::Format { file: self.file.into(), reason });
         }
+        // First, so that a bad parameter is named itself and not by the expressions that use it.
+        let parameters = raw.parameter.iter().map(|p| self.parameter(p)).collect::<Result<_, _>>()?;
         let frames = raw.frame.iter().map(|f| self.frame(f)).collect::<Result<Vec<_>, _>>()?;
         let symmetry = raw.symmetry.iter().map(|rule| {
             let when = rule.when.as_deref().map(|text| self.expression("symmetry", text)).transpose()?;
@@ -140,7 +145,7 @@ impl Meaning<'_> {
             seen_by: raw.seen_by,
             prior: raw.prior,
             affordances: raw.affordances.clone(),
-            parameters: raw.parameter.iter().map(|p| self.parameter(p)).collect::<Result<_, _>>()?,
+            parameters,
             constraints: self.expressions("constraints", &raw.constraints)?,
             solids: raw.solid.iter().map(|s| self.solid(s)).collect::<Result<_, _>>()?,
             functions: raw.function.iter().map(|f| self.function(f, &frames)).collect::<Result<_, _>>()?,
@@ -154,6 +159,11 @@ impl Meaning<'_> {
             |reason: String| TemplateError::Parameter { file: self.file.into(), parameter: raw.name.clone(), reason };
         if self.names.iter().filter(|name| **name == raw.name).count() > 1 {
             return Err(wrong("is declared twice".into()));
+        }
+        if CONSTANTS.contains(&raw.name.as_str()) {
+            return Err(wrong(
+                "has the name of a constant, which expressions would read instead; choose another".into(),
+            ));
         }
         if MEASURES.contains(&raw.name.as_str()) {
             return Err(wrong("has the name of a segment measure; choose another".into()));

@@ -61,6 +61,7 @@ fn mistakes_are_named() {
     let error = |from: &str, to: &str| Template::parse("puck.toml", &PUCK.replace(from, to)).unwrap_err().to_string();
     assert!(error("seen_by", "sen_by").contains("did you mean `seen_by`"));
     assert!(error("max = 0.1\n", "max = 0.001\n").contains("`radius` has the range 0.01 to 0.001"));
+    assert!(error("name = \"height\"", "name = \"E\"").contains("name of a constant"));
     assert!(error("max = 0.1\n", "max = 50.0\n").contains("lengths must lie in"));
     assert!(error("initial = \"extent_z\"", "initial = \"0.2\"").contains("out of its range"));
     assert!(error("frame = \"top\"", "frame = \"tip\"").contains("`tip`"));
