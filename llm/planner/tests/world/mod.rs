@@ -375,7 +375,14 @@ impl MemoryView for World {
         let history = &self.entry(object).history;
         let first_gone = history.iter().position(|h| h.place.is_none());
         match first_gone.and_then(|at| history[..at].last()).and_then(|h| h.place) {
-            Some(value) => Recall::Known { value, confidence: 0.9, evidence: vec![Evidence::Frame(FrameId(0))] },
+            Some(value) => {
+                let left = first_gone.map(|at| match history[at].cause {
+                    PlaceCause::Grasped(transition) | PlaceCause::Own(transition) => Evidence::Transition(transition),
+                    PlaceCause::Seen(frame) | PlaceCause::Gone(frame) => Evidence::Frame(frame),
+                });
+                let evidence = [Evidence::Frame(FrameId(0))].into_iter().chain(left).collect();
+                Recall::Known { value, confidence: 0.9, evidence }
+            }
             None => {
                 Recall::Unknown { reason: "no move of it was seen or made".into(), candidates: self.candidates.clone() }
             }
