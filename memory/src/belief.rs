@@ -288,7 +288,7 @@ impl Reader<'_> {
     }
 
     fn is_affordance(&self, word: &str) -> bool {
-        self.library.iter().any(|template| template.affordances.iter().any(|affordance| affordance == word))
+        self.library.iter().any(|template| template.affordances().any(|affordance| affordance == word))
     }
 
     fn affords(&self, entry: &ObjectEntry, word: &str) -> Belief {

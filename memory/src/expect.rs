@@ -34,6 +34,7 @@ pub(crate) fn expect(state: &State, now: Time) -> Expectation {
             parts,
             appearance: entry.appearance,
             confidence: entry.confidence,
+            views: entry.views,
             held,
         }
     };

@@ -3,7 +3,7 @@
 use acm_concept::{
     object::GroundedPart,
     pose::{Pose, wrap_angle},
-    solid::Solid,
+    solid::{PlacedSolid, Solid},
     template::{TemplateLibrary, YawSymmetry},
 };
 use glam::{DVec2, DVec3};
@@ -42,9 +42,9 @@ impl Body {
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         let mut radius = Some(0.0f64);
         for part in parts {
-            for placed in library.get(&part.template)?.solids(&part.values()).ok()? {
+            for placed in library.solids_of(part)? {
                 let pose = into_main * part.pose.pose * placed.pose;
-                let half = rotated_half_extents(&placed.solid, &pose);
+                let half = PlacedSolid { solid: placed.solid, pose }.half_extents();
                 (low, high) = (low.min(pose.translation - half), high.max(pose.translation + half));
                 radius = match (radius, placed.solid) {
                     (Some(largest), Solid::Cylinder { radius, .. })
@@ -109,12 +109,6 @@ impl Body {
             Outline::Disc(radius) => radius,
         }
     }
-}
-
-fn rotated_half_extents(solid: &Solid, pose: &Pose) -> DVec3 {
-    let half = solid.half_extents();
-    let axis = |unit: DVec3, length: f64| pose.transform_vector(unit).abs() * length;
-    axis(DVec3::X, half.x) + axis(DVec3::Y, half.y) + axis(DVec3::Z, half.z)
 }
 
 /// The symmetry of a grounded part; a part whose template cannot say is taken to have none.

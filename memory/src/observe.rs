@@ -36,6 +36,8 @@ const CERTAIN_ABSENCE: f64 = 0.8;
 const FLAT_M: f64 = 0.005;
 /// Colours nearer than this in the a-b plane are the same.
 const SAME_COLOR: f64 = 15.0;
+/// A newcomer that lies inside something is a piece of it unless it is larger by more than this factor says.
+const FRAGMENT_AREA: f64 = 0.7;
 /// Matches above this probability may verify an object.
 const SURE_MATCH: f64 = 0.6;
 
@@ -238,7 +240,7 @@ impl Frame<'_, '_, '_> {
                 // Flat things under a block sink into it by the camera's error.
                 body.height() > FLAT_M && shared > 0.5 * body.height()
             };
-            same_solid && other.area() > body.area() && other.covers(body.centre, 0.0)
+            same_solid && other.area() > FRAGMENT_AREA * body.area() && other.covers(body.centre, 0.0)
         })
     }
 

@@ -54,6 +54,7 @@ impl Thing {
         let appearance = Appearance { mean: Lab::from_srgb([128, 128, 128]), spread: 3.0 };
         let pose = PoseEstimate { pose: Pose::IDENTITY, position_sigma_m: DVec3::splat(SIGMA_M), yaw_sigma_rad: 0.03 };
         let part = GroundedPart {
+            name: acm_concept::template::WHOLE.into(),
             template: template.into(),
             parameters: parameters.iter().map(estimate).collect(),
             pose,

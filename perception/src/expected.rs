@@ -27,6 +27,10 @@ const DECIDED: f64 = 0.25;
 const SAME_OVERLAP: f64 = 0.25;
 /// A percept is taken for what is expected if that explains so much of it.
 const EXPLAINED: f64 = 0.6;
+/// From so many views on a thing's parameters are taken as known while they explain what is seen.
+const SETTLED_VIEWS: u32 = 6;
+/// An expected object claims a segment of which it explains so much.
+const CLAIMED: f64 = 0.75;
 /// Expected objects split a segment if each finds at least so many of its pixels in it, and so much of itself.
 const SPLIT_PX: usize = 60;
 const SPLIT_SHARE: f64 = 0.4;
@@ -35,12 +39,22 @@ const SPLIT_SHARE: f64 = 0.4;
 struct Ghost {
     id: ObjectId,
     main: Option<GroundedPart>,
+    views: u32,
     solids: Vec<PlacedSolid>,
     flat: bool,
     /// Share of it that the sensor covers.
     in_view: f64,
     /// Its predicted pixels, ascending, and what each says.
     votes: Vec<(usize, Vote)>,
+}
+
+/// What memory expects where something was found.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Known<'a> {
+    /// The main part.
+    pub part: &'a GroundedPart,
+    /// Whether it was seen often enough that its parameters need not be measured anew.
+    pub settled: bool,
 }
 
 /// The expected objects, ray-cast into the frame and compared with it.
@@ -80,6 +94,7 @@ impl Remembered {
             Ghost {
                 id: object.id,
                 main: object.parts.first().cloned(),
+                views: object.views,
                 flat,
                 in_view: cast.in_view,
                 votes: cast.hits.into_iter().map(vote).collect(),
@@ -89,9 +104,9 @@ impl Remembered {
         Remembered { ghosts: expectation.objects.iter().map(ghost).collect() }
     }
 
-    /// The main part of the expected object that explains these pixels (ascending) best, if one explains most of
-    /// them or is mostly covered by them.
-    pub fn part_at(&self, pixels: &[usize], seen_by: SeenBy) -> Option<&GroundedPart> {
+    /// The expected object that explains these pixels (ascending) best, if one explains most of them or is mostly
+    /// covered by them.
+    pub fn at(&self, pixels: &[usize], seen_by: SeenBy) -> Option<Known<'_>> {
         let flat = seen_by == SeenBy::Color;
         let explained = |ghost: &Ghost| {
             let agrees = |(pixel, vote): &&(usize, Vote)| *vote == Vote::Agrees && pixels.binary_search(pixel).is_ok();
@@ -99,14 +114,15 @@ impl Remembered {
         };
         let candidates = self.ghosts.iter().filter(|ghost| ghost.flat == flat);
         let (best, ghost) = candidates.map(|ghost| (explained(ghost), ghost)).max_by(|a, b| a.0.total_cmp(&b.0))?;
-        ghost.main.as_ref().filter(|_| best > EXPLAINED || overlap(ghost, pixels) > SAME_OVERLAP)
+        let part = ghost.main.as_ref().filter(|_| best > EXPLAINED || overlap(ghost, pixels) > SAME_OVERLAP)?;
+        Some(Known { part, settled: ghost.views >= SETTLED_VIEWS })
     }
 }
 
 /// The solids of parts in the world; parts of unknown templates have none.
 pub(crate) fn solids(parts: &[GroundedPart], library: &TemplateLibrary) -> Vec<PlacedSolid> {
     let of_part = |part: &GroundedPart| {
-        let local = library.get(&part.template).and_then(|t| t.solids(&part.values()).ok()).unwrap_or_default();
+        let local = library.solids_of(part).unwrap_or_default();
         let place = part.pose.pose;
         local.into_iter().map(move |s| PlacedSolid { solid: s.solid, pose: place * s.pose }).collect::<Vec<_>>()
     };
@@ -216,6 +232,32 @@ pub(crate) fn hint(remembered: &Remembered, objects: &mut [GroundedObject], libr
         if objects[object].expected.is_none() && !taken[ghost] {
             objects[object].expected = Some(remembered.ghosts[ghost].id);
             taken[ghost] = true;
+        }
+    }
+}
+
+/// Joins segments that one expected object explains: pieces of one thing between which noise has drawn an edge.
+pub(crate) fn merge(remembered: &Remembered, segments: &mut Segments) {
+    let mut size = vec![0usize; segments.count];
+    for label in segments.labels.iter().filter(|label| **label != NONE) {
+        size[*label as usize] += 1;
+    }
+    let mut claimed = vec![false; segments.count];
+    for ghost in remembered.ghosts.iter().filter(|ghost| !ghost.flat) {
+        let mut agreeing = vec![0usize; size.len()];
+        for (pixel, _) in ghost.votes.iter().filter(|(_, vote)| *vote == Vote::Agrees) {
+            if let Some(count) = agreeing.get_mut(segments.labels[*pixel] as usize) {
+                *count += 1;
+            }
+        }
+        let claims = |label: &usize| agreeing[*label] > 0 && agreeing[*label] as f64 > CLAIMED * size[*label] as f64;
+        let pieces: Vec<usize> = (0..size.len()).filter(|label| !claimed[*label]).filter(claims).collect();
+        let Some((&whole, rest)) = pieces.split_first() else { continue };
+        for label in segments.labels.iter_mut().filter(|label| rest.contains(&(**label as usize))) {
+            *label = whole as u32;
+        }
+        for label in pieces {
+            claimed[label] = true;
         }
     }
 }

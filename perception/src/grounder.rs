@@ -105,6 +105,7 @@ impl Grounder {
     fn objects(&self, scene: &Scene, expectation: &Expectation, remembered: &Remembered) -> Vec<GroundedObject> {
         let mut segments = segments::split(scene);
         expected::split(scene, remembered, &mut segments);
+        expected::merge(remembered, &mut segments);
         let unremembered =
             Context { library: &self.library, config: &self.config, nouns: &expectation.nouns, remembered: None };
         joins::join(scene, &mut segments, unremembered);
@@ -113,7 +114,7 @@ impl Grounder {
         let (mut objects, mut bodies) = (Vec::new(), Bodies::default());
         for patch in patches::find(scene, &standing) {
             let measured = Measured { plan: patch.plan, height_m: 0.0, base: Base::At(0.0), seen_by: SeenBy::Color };
-            let context = context(remembered.part_at(&patch.pixels, SeenBy::Color));
+            let context = context(remembered.at(&patch.pixels, SeenBy::Color));
             let ranked = hypotheses::rank(context, &measured, &patch.evidence);
             if let Some(object) = assemble::object(scene, context, &ranked, &patch.evidence, &patch.pixels, patch.fill)
             {
@@ -140,7 +141,7 @@ impl Grounder {
             };
             let height_m = evidence.top_m() - bottom;
             let measured = Measured { plan, height_m, base, seen_by: SeenBy::Depth };
-            let context = context(remembered.part_at(&pixels, SeenBy::Depth));
+            let context = context(remembered.at(&pixels, SeenBy::Depth));
             let ranked = hypotheses::rank(context, &measured, &evidence);
             if let Some(object) = assemble::object(scene, context, &ranked, &evidence, &pixels, 1.0) {
                 bodies.add(&ranked);

@@ -3,6 +3,7 @@
 
 use crate::{
     config::GrounderConfig,
+    expected::Known,
     fit::{Base, Evidence, Minimum, Model, OutlineKind, approach, cost, minimise, rough_cost},
     measure::{self, Rectangle},
 };
@@ -32,8 +33,8 @@ pub(crate) struct Context<'a> {
     pub config: &'a GrounderConfig,
     /// Nouns of the instruction.
     pub nouns: &'a [String],
-    /// The main part of what memory expects here.
-    pub remembered: Option<&'a GroundedPart>,
+    /// What memory expects here.
+    pub remembered: Option<Known<'a>>,
 }
 
 /// One template with its fit.
@@ -47,6 +48,11 @@ pub(crate) struct Hypothesis<'a> {
     pub tracked: Option<&'a GroundedPart>,
 }
 
+/// What is known is recognised if its cost is at most so many times what noise explains, and it explains these shares
+/// of the surface and of the outline.
+const RECOGNISED_MISFIT: f64 = 1.2;
+const RECOGNISED: f64 = 0.93;
+const RECOGNISED_OUTLINE: f64 = 0.85;
 /// Headings that are tried as starts: a quarter turn in steps of 7.5 degrees.
 const YAW_STEP: f64 = std::f64::consts::PI / 24.0;
 /// A thing of which more than this share of the outline is cut off may take over its remembered size.
@@ -60,6 +66,9 @@ const STARTS: usize = 2;
 
 /// All templates that can explain a segment, the most probable first.
 pub(crate) fn rank<'a>(context: Context<'a>, measured: &Measured, evidence: &Evidence) -> Vec<Hypothesis<'a>> {
+    if let Some(known) = recognise(context, measured, evidence) {
+        return vec![known];
+    }
     let rectangles = measure::rectangles(&measured.plan, YAW_STEP, 0.01);
     let circle = measure::circle(&measured.plan);
     let templates = context.library.iter().filter(|template| template.seen_by == measured.seen_by);
@@ -84,6 +93,21 @@ pub(crate) fn rank<'a>(context: Context<'a>, measured: &Measured, evidence: &Evi
     let odds: Vec<f64> = scored.iter().map(|(score, _)| ((score - best) / temperature).exp()).collect();
     let total: f64 = odds.iter().sum();
     scored.into_iter().zip(odds).map(|((_, h), odd)| Hypothesis { probability: odd / total, ..h }).collect()
+}
+
+/// What is settled in memory and explains the evidence as well as noise lets anything do: only its place is fitted,
+/// beginning where it is expected, and no other template is tried.
+fn recognise<'a>(context: Context<'a>, measured: &Measured, evidence: &Evidence) -> Option<Hypothesis<'a>> {
+    let Known { part, .. } = context.remembered.filter(|known| known.settled)?;
+    let template = context.library.get(&part.template).filter(|t| t.seen_by == measured.seen_by)?;
+    let values: Vec<f64> = template.parameters.iter().map(|p| part.value(&p.name)).collect::<Option<_>>()?;
+    let model = Model::rigid(template, values, measured.base)?;
+    let start = model.start(part.pose.pose.translation.truncate(), part.pose.pose.yaw());
+    let minimum = minimise(&model, evidence, &approach(&model, evidence, &start));
+    let found = Hypothesis { model, minimum, probability: 1.0, tracked: Some(part) };
+    let (on_surface, on_outline) = found.explained(evidence);
+    let misfit = found.minimum.cost / (0.5 * evidence.independent()).max(1.0);
+    (misfit < RECOGNISED_MISFIT && on_surface > RECOGNISED && on_outline > RECOGNISED_OUTLINE).then_some(found)
 }
 
 /// A template brought near to a minimum.
@@ -113,6 +137,11 @@ fn nearest<'a>(
         Some((rough_cost(&model, evidence, &start), model, start))
     };
     let mut starts: Vec<_> = rectangles.iter().filter_map(start_at).collect();
+    // A thing whose two ends differ may lie either way round.
+    let turned = |r: &Rectangle| Rectangle { yaw: r.yaw + std::f64::consts::PI, ..*r };
+    if starts.first().is_some_and(|(_, model, _)| model.has_two_ends()) {
+        starts.extend(rectangles.iter().map(turned).filter_map(|r| start_at(&r)));
+    }
     starts.sort_by(|a, b| a.0.total_cmp(&b.0));
     let turns = starts.first().is_some_and(|(_, model, _)| model.turns);
     let near = starts.into_iter().take(if turns { STARTS } else { 1 }).map(|(_, model, start)| {
@@ -130,7 +159,7 @@ fn track<'a>(
     rectangles: &[Rectangle],
     evidence: &Evidence,
 ) -> Option<(f64, Hypothesis<'a>)> {
-    let part = context.remembered.filter(|_| evidence.cut_share() > TRACKED_CUT)?;
+    let Known { part, .. } = context.remembered.filter(|_| evidence.cut_share() > TRACKED_CUT)?;
     let template = context.library.get(&part.template).filter(|t| t.seen_by == measured.seen_by)?;
     let values: Vec<f64> = template.parameters.iter().map(|p| part.value(&p.name)).collect::<Option<_>>()?;
     let model = Model::rigid(template, values, measured.base)?;
@@ -184,7 +213,7 @@ fn score(context: Context, model: &Model, minimum: &Minimum, evidence: &Evidence
     if spoken_of {
         score += context.config.noun_boost.ln();
     }
-    if context.remembered.is_some_and(|part| part.template == template.name) {
+    if context.remembered.is_some_and(|known| known.part.template == template.name) {
         score += context.config.memory_boost.ln();
     }
     score

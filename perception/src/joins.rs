@@ -14,6 +14,8 @@ use std::collections::BTreeSet;
 
 /// Most joins in one frame.
 const MAX_JOINS: usize = 24;
+/// Colours of the parts of one thing that are joined by their shape differ by less, in the units of a tint.
+const SAME_TINT: f64 = 12.0;
 /// Tops of pieces of one thing are level within this.
 const LEVEL_M: f64 = 0.016;
 
@@ -52,6 +54,8 @@ enum Relation {
     Inside,
     /// The second is the far end of the first.
     OtherEnd,
+    /// Both are parts of one template.
+    OnePart,
 }
 
 /// Joins pieces until no two belong together.
@@ -92,7 +96,14 @@ fn related(
     pieces: &[Piece],
     refused: &mut BTreeSet<(Relation, u32, u32)>,
 ) -> Option<(u32, u32, Relation)> {
-    let relations = [Relation::Artefact, Relation::Floor, Relation::Surface, Relation::Inside, Relation::OtherEnd];
+    let relations = [
+        Relation::Artefact,
+        Relation::Floor,
+        Relation::Surface,
+        Relation::Inside,
+        Relation::OtherEnd,
+        Relation::OnePart,
+    ];
     for relation in relations {
         for (a, b) in pieces.iter().flat_map(|a| pieces.iter().map(move |b| (a, b))).filter(|(a, b)| a.label != b.label)
         {
@@ -106,6 +117,7 @@ fn related(
                 Relation::Surface => is_fragment_of(scene, a, b),
                 Relation::Inside => is_inside_of(scene, segments, context, a, b),
                 Relation::OtherEnd => is_other_end(scene, segments, context, a, b),
+                Relation::OnePart => is_one_with(scene, segments, context, a, b),
             };
             if holds {
                 return Some((a.label, b.label, relation));
@@ -168,21 +180,48 @@ fn is_other_end(scene: &Scene, segments: &Segments, context: Context, a: &Piece,
         return false;
     }
     let joint = union(scene, segments, a, b, false);
-    let (Some(one), Some(left), Some(right)) =
-        (fit(context, &joint, 0.0), fit(context, &a.evidence, 0.0), fit(context, &b.evidence, 0.0))
-    else {
+    let Some(comparison) = compare(context, &joint, a, b) else { return false };
+    // Systematic errors of the sensor tell against the larger solid; two things in one line are rare.
+    comparison.together < 1.5 * comparison.apart + 10.0 && comparison.on_surface > 0.9 && comparison.on_outline > 0.85
+}
+
+/// Whether two pieces that touch and look alike are parts of one thing, like a base and the lid over it: one template
+/// explains both better than two do.
+fn is_one_with(scene: &Scene, segments: &Segments, context: Context, a: &Piece, b: &Piece) -> bool {
+    let either = [OutlineKind::Contact, OutlineKind::Cut, OutlineKind::Own];
+    let touches = |piece: &Piece, other: &Piece| piece.evidence.border_share(other.label, &either) > 0.15;
+    let tint = |piece: &Piece| Tint::of(&scene.scan.appearance(&piece.pixels).mean);
+    if a.label > b.label || !(touches(a, b) || touches(b, a)) || tint(a).distance(&tint(b)) > SAME_TINT {
         return false;
-    };
+    }
+    let joint = union(scene, segments, a, b, false);
+    let Some(comparison) = compare(context, &joint, a, b) else { return false };
+    comparison.together < comparison.apart && comparison.on_surface > 0.93 && comparison.on_outline > 0.85
+}
+
+/// What it costs to explain two pieces as one thing and as two, and how much the one explains.
+struct Comparison {
+    together: f64,
+    apart: f64,
+    on_surface: f64,
+    on_outline: f64,
+}
+
+fn compare(context: Context, joint: &Evidence, a: &Piece, b: &Piece) -> Option<Comparison> {
+    let one = fit(context, joint, 0.0)?;
+    let (left, right) = (fit(context, &a.evidence, 0.0)?, fit(context, &b.evidence, 0.0)?);
     let penalty = |h: &Hypothesis, evidence: &Evidence| {
         h.minimum.cost + 0.5 * h.minimum.state.len() as f64 * evidence.independent().max(2.0).ln()
     };
     // The joint evidence is thinned to the same number of points: compare per independent measurement.
-    let apart = penalty(&left, &a.evidence) + penalty(&right, &b.evidence);
     let share = (a.evidence.independent() + b.evidence.independent()) / joint.independent().max(1.0);
-    let together = penalty(&one, &joint) * share.max(1.0);
-    let (on_surface, on_outline) = one.explained(&joint);
-    // Systematic errors of the sensor tell against the larger solid; two things in one line are rare.
-    together < 1.5 * apart + 10.0 && on_surface > 0.9 && on_outline > 0.85
+    let (on_surface, on_outline) = one.explained(joint);
+    Some(Comparison {
+        together: penalty(&one, joint) * share.max(1.0),
+        apart: penalty(&left, &a.evidence) + penalty(&right, &b.evidence),
+        on_surface,
+        on_outline,
+    })
 }
 
 /// The evidence of two pieces as one; without the inner piece's surface if it is the inside of something hollow.

@@ -254,20 +254,27 @@ impl CameraSource for Cameras {
     }
     fn capture(&mut self, camera: &str) -> Result<RgbdFrame, CameraError> {
         let failed = |reason: String| CameraError::Failed { name: camera.into(), reason };
-        let Some(found) = self.cameras.iter().find(|known| known.nominal.name == camera) else {
+        let Some(at) = self.cameras.iter().position(|known| known.nominal.name == camera) else {
             let known = self.models.iter().map(|model| model.name.as_str()).collect::<Vec<_>>().join(", ");
             return Err(CameraError::UnknownCamera { name: camera.into(), known });
         };
+        let found = &self.cameras[at];
         let renderer = self.renderer.as_ref().ok_or_else(|| failed("the simulation has no renderer".into()))?;
         let mut world = lock(&self.shared);
-        let started = cpu_s(ClockId::ProcessCPUTime);
-        let scene = self.stage.scene(&world);
-        let truth = found.sensor.true_camera(&found.nominal);
-        let rendered = lock(renderer).render(&scene, &truth).map_err(|e| failed(e.to_string()))?;
-        world.timings.render_s += cpu_s(ClockId::ProcessCPUTime) - started;
-        let started = cpu_s(ClockId::ThreadCPUTime);
-        let measured = found.sensor.measure(&rendered, &truth, &mut self.noise);
-        world.timings.noise_s += cpu_s(ClockId::ThreadCPUTime) - started;
+        let pixels = found.nominal.intrinsics.pixels();
+        let (color, depth) = if world.is_covered(at) {
+            (vec![0; 3 * pixels], vec![0.0; pixels])
+        } else {
+            let started = cpu_s(ClockId::ProcessCPUTime);
+            let scene = self.stage.scene(&world);
+            let truth = found.sensor.true_camera(&found.nominal);
+            let rendered = lock(renderer).render(&scene, &truth).map_err(|e| failed(e.to_string()))?;
+            world.timings.render_s += cpu_s(ClockId::ProcessCPUTime) - started;
+            let started = cpu_s(ClockId::ThreadCPUTime);
+            let measured = found.sensor.measure(&rendered, &truth, &mut self.noise);
+            world.timings.noise_s += cpu_s(ClockId::ThreadCPUTime) - started;
+            (measured.color, measured.depth)
+        };
         let header = FrameHeader {
             id: FrameId(self.next),
             camera: camera.into(),
@@ -276,7 +283,7 @@ impl CameraSource for Cameras {
             camera_pose: found.nominal.pose,
         };
         self.next += 1;
-        RgbdFrame::new(header, measured.color.into(), measured.depth.into()).map_err(|e| failed(e.to_string()))
+        RgbdFrame::new(header, color.into(), depth.into()).map_err(|e| failed(e.to_string()))
     }
 }
 

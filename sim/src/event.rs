@@ -1,26 +1,31 @@
-//! What third parties do: they carry objects from place to place, whether a camera sees it or not.
+//! What third parties do: they carry objects from place to place, whether a camera sees it or not, and stand before
+//! cameras.
 
 use crate::{
     body::Body,
     convert::to_engine,
     layout::{Layout, LayoutError, number, vector},
     oracle::Watch,
-    scenario::WorldSpec,
+    scenario::{DeedSpec, EventSpec, WorldSpec},
 };
 use acm_concept::pose::Pose;
 use glam::DVec3;
 use rapier3d::prelude::{PhysicsWorld, RigidBodyType};
 
-/// A scripted carry.
+/// A scripted event.
 #[derive(Debug, Clone)]
 pub(crate) struct Event {
     when: Option<Watch>,
     after_s: f64,
-    body: usize,
-    to: Pose,
     over_s: f64,
-    lift_m: f64,
+    deed: Deed,
     phase: Phase,
+}
+
+#[derive(Debug, Clone)]
+enum Deed {
+    Carry { body: usize, to: Pose, lift_m: f64 },
+    Cover { cameras: Vec<usize> },
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -28,27 +33,27 @@ enum Phase {
     Waiting,
     /// The timer runs until this moment.
     Timed(f64),
-    /// Carried from this pose since this moment.
-    Carrying(Pose, f64),
+    /// Under way since this moment; what is carried came from this pose.
+    Acting(Pose, f64),
     Done,
 }
 
 /// The events of a world, their places in it looked up.
 pub(crate) fn build(spec: &WorldSpec, layout: &Layout, variables: &[String]) -> Result<Vec<Event>, LayoutError> {
-    let event = |event: &crate::scenario::EventSpec| {
-        let carried = &layout.find(spec, &event.carry)?.name;
-        let scope = layout.scope();
-        let to = vector(&event.name, &event.to, &scope)?;
-        Ok(Event {
-            when: event.when.as_ref().map(|when| Watch::new(when, variables)),
-            after_s: event.after_s,
-            // The name was just taken from this list.
-            body: layout.objects.iter().position(|object| object.name == *carried).unwrap_or_default(),
-            to: Pose::from_yaw(to, number(&event.name, &event.yaw, &scope)?),
-            over_s: event.over_s,
-            lift_m: event.lift_m,
-            phase: Phase::Waiting,
-        })
+    let event = |event: &EventSpec| {
+        let deed = match &event.deed {
+            DeedSpec::Carry { object, to, yaw, lift_m } => {
+                let carried = &layout.find(spec, object)?.name;
+                let scope = layout.scope();
+                let to = Pose::from_yaw(vector(&event.name, to, &scope)?, number(&event.name, yaw, &scope)?);
+                // The name was just taken from this list.
+                let body = layout.objects.iter().position(|object| object.name == *carried).unwrap_or_default();
+                Deed::Carry { body, to, lift_m: *lift_m }
+            }
+            DeedSpec::Cover { cameras } => Deed::Cover { cameras: cameras.clone() },
+        };
+        let when = event.when.as_ref().map(|when| Watch::new(when, variables));
+        Ok(Event { when, after_s: event.after_s, over_s: event.over_s, deed, phase: Phase::Waiting })
     };
     spec.events.iter().map(event).collect()
 }
@@ -56,36 +61,52 @@ pub(crate) fn build(spec: &WorldSpec, layout: &Layout, variables: &[String]) -> 
 impl Event {
     /// Goes on by one physics step.
     pub(crate) fn step(&mut self, world: &mut PhysicsWorld, bodies: &mut [Body], state: &[f64], now_s: f64) {
-        let Some(body) = bodies.get(self.body) else { return };
         self.phase = match self.phase {
             Phase::Waiting if self.when.as_ref().is_none_or(|when| when.holds(state)) => {
                 Phase::Timed(now_s + self.after_s)
             }
-            Phase::Timed(at) if now_s >= at - 1e-9 => {
-                take(world, body, true);
-                Phase::Carrying(body.pose(world), now_s)
-            }
-            Phase::Carrying(from, since) => {
+            Phase::Timed(at) if now_s >= at - 1e-9 => Phase::Acting(self.deed.begin(world, bodies), now_s),
+            Phase::Acting(from, since) => {
                 let share = ((now_s - since) / self.over_s).min(1.0);
-                carry(world, body, &self.on_the_way(&from, share));
-                if share < 1.0 { Phase::Carrying(from, since) } else { self.let_go(world, body) }
+                self.deed.go_on(world, bodies, &from, share);
+                if share < 1.0 { Phase::Acting(from, since) } else { Phase::Done }
             }
             other => other,
         };
     }
 
-    /// Straight from pose to pose with an arch of height `lift_m`, slow at both ends.
-    fn on_the_way(&self, from: &Pose, share: f64) -> Pose {
-        let eased = share * share * (3.0 - 2.0 * share);
-        let arch = DVec3::Z * (self.lift_m * (std::f64::consts::PI * eased).sin());
-        Pose::from_translation(arch) * from.interpolate(&self.to, eased)
+    /// Whether it hides the world from a camera now.
+    pub(crate) fn covers(&self, camera: usize) -> bool {
+        let covered = matches!(&self.deed, Deed::Cover { cameras } if cameras.contains(&camera));
+        covered && matches!(self.phase, Phase::Acting(..))
+    }
+}
+
+impl Deed {
+    /// Takes what is carried; says where it was.
+    fn begin(&self, world: &mut PhysicsWorld, bodies: &[Body]) -> Pose {
+        let Deed::Carry { body, .. } = self else { return Pose::IDENTITY };
+        let Some(body) = bodies.get(*body) else { return Pose::IDENTITY };
+        take(world, body, true);
+        body.pose(world)
     }
 
-    fn let_go(&self, world: &mut PhysicsWorld, body: &Body) -> Phase {
+    fn go_on(&self, world: &mut PhysicsWorld, bodies: &[Body], from: &Pose, share: f64) {
+        let Deed::Carry { body, to, lift_m } = self else { return };
+        let Some(body) = bodies.get(*body) else { return };
+        if share < 1.0 {
+            return carry(world, body, &on_the_way(from, to, *lift_m, share));
+        }
         take(world, body, false);
-        put(world, body, &self.to);
-        Phase::Done
+        put(world, body, to);
     }
+}
+
+/// Straight from pose to pose with an arch of height `lift_m`, slow at both ends.
+fn on_the_way(from: &Pose, to: &Pose, lift_m: f64, share: f64) -> Pose {
+    let eased = share * share * (3.0 - 2.0 * share);
+    let arch = DVec3::Z * (lift_m * (std::f64::consts::PI * eased).sin());
+    Pose::from_translation(arch) * from.interpolate(to, eased)
 }
 
 fn take(world: &mut PhysicsWorld, body: &Body, taken: bool) {

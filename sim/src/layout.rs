@@ -4,7 +4,7 @@ use crate::{
     convert::to_engine,
     model::{ButtonModel, ModelSolid, ObjectModel},
     random::{DrawError, Draws, Scope, Stream, count},
-    scenario::{ObjectSpec, PlaceAt, RawPerturb, Reference, RejectSpec, WorldSpec},
+    scenario::{ObjectSpec, PlaceAt, RawPerturb, Reference, RejectRule, RejectSpec, WorldSpec},
 };
 use acm_concept::{
     expression::{Expression, ExpressionError},
@@ -146,7 +146,8 @@ impl Layout {
                 None => local,
             };
             let name = if spec.count.is_some() { format!("{}_{copy}", spec.name) } else { spec.name.clone() };
-            self.objects.push(Placed::build(name, index, spec, pose, details));
+            let make = Make::of(spec, &scope)?;
+            self.objects.push(Placed::build(name, index, spec, &make, pose, details));
         }
         Ok(())
     }
@@ -187,18 +188,29 @@ impl Layout {
     }
 
     fn rejected_by<'a>(&self, world: &'a WorldSpec) -> Result<Option<&'a RejectSpec>, LayoutError> {
-        for rule in &world.rejects {
-            let [first, second] = rule.between.each_ref().map(|name| self.shapes(world, name));
-            let same = rule.between[0] == rule.between[1];
-            for (i, a) in first.iter().enumerate() {
-                for (j, b) in second.iter().enumerate() {
-                    if (!same || i < j) && gap(a, b)? < rule.nearer_than_m {
-                        return Ok(Some(rule));
-                    }
-                }
+        for spec in &world.rejects {
+            let rejected = match &spec.rule {
+                RejectRule::When(condition) => evaluate("random.reject.when", condition, &self.scope())? != 0.0,
+                RejectRule::Near { between, nearer_than_m } => self.gap_between(world, between)? < *nearer_than_m,
+            };
+            if rejected {
+                return Ok(Some(spec));
             }
         }
         Ok(None)
+    }
+
+    /// The smallest gap between copies of two things, metres.
+    fn gap_between(&self, world: &WorldSpec, between: &[String; 2]) -> Result<f64, LayoutError> {
+        let [first, second] = between.each_ref().map(|name| self.shapes(world, name));
+        let same = between[0] == between[1];
+        let mut smallest = f64::INFINITY;
+        for (i, a) in first.iter().enumerate() {
+            for (_, b) in second.iter().enumerate().filter(|(j, _)| !same || i < *j) {
+                smallest = smallest.min(gap(a, b)?);
+            }
+        }
+        Ok(smallest)
     }
 
     /// The solids of every copy of an object, or a small ball at a place, in the world.
@@ -211,7 +223,14 @@ impl Layout {
 }
 
 impl Placed {
-    fn build(name: String, index: usize, spec: &ObjectSpec, pose: Pose, details: &mut ChaCha8Rng) -> Placed {
+    fn build(
+        name: String,
+        index: usize,
+        spec: &ObjectSpec,
+        make: &Make,
+        pose: Pose,
+        details: &mut ChaCha8Rng,
+    ) -> Placed {
         let ObjectModel { model, fixed, density_kg_m3, friction, solid, button, .. } = &spec.model;
         let (grow, bevel) = deviation(spec.perturb, details);
         let mut object = Placed {
@@ -221,7 +240,7 @@ impl Placed {
             fixed: *fixed,
             density: *density_kg_m3,
             friction: *friction,
-            solids: solid.iter().map(|solid| built(solid, grow, bevel)).collect(),
+            solids: solid.iter().map(|solid| make.apply(built(solid, grow, bevel))).collect(),
             cap: button.iter().flat_map(|button| &button.solid).map(|solid| built(solid, DVec3::ZERO, 0.0)).collect(),
             button: button.clone(),
             pose,
@@ -232,7 +251,7 @@ impl Placed {
 
     /// A perturbed solid is centred where the model's is; the object must still stand on its base frame.
     fn stand_on_base(&mut self) {
-        let bottom = |built: &BuiltSolid| built.placed.pose.translation.z - built.placed.solid.half_extents().z;
+        let bottom = |built: &BuiltSolid| built.placed.pose.translation.z - built.placed.half_extents().z;
         let lowest = self.solids.iter().map(bottom).fold(f64::INFINITY, f64::min);
         for built in self.solids.iter_mut().chain(&mut self.cap) {
             built.placed.pose.translation.z -= lowest;
@@ -241,7 +260,7 @@ impl Placed {
 
     /// Height of its top over its base frame, metres.
     pub(crate) fn height(&self) -> f64 {
-        let top = |built: &BuiltSolid| built.placed.pose.translation.z + built.placed.solid.half_extents().z;
+        let top = |built: &BuiltSolid| built.placed.pose.translation.z + built.placed.half_extents().z;
         self.solids.iter().chain(&self.cap).map(top).fold(0.0, f64::max)
     }
 
@@ -249,11 +268,61 @@ impl Placed {
     pub(crate) fn size(&self) -> DVec3 {
         let start = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         let (low, high) = self.solids.iter().chain(&self.cap).fold(start, |(low, high), built| {
-            let (centre, half) = (built.placed.pose.translation, built.placed.solid.half_extents());
+            let (centre, half) = (built.placed.pose.translation, built.placed.half_extents());
             (low.min(centre - half), high.max(centre + half))
         });
         high - low
     }
+}
+
+/// How one copy is made differently from its model on purpose.
+struct Make {
+    scale: DVec3,
+    hue_deg: Option<f64>,
+}
+
+/// Factors beyond these make no sense.
+const SCALES: std::ops::RangeInclusive<f64> = 0.1..=10.0;
+
+impl Make {
+    fn of(spec: &ObjectSpec, scope: &Scope) -> Result<Make, LayoutError> {
+        let scale = match &spec.scale {
+            Some(scale) => vector(&spec.name, scale, scope)?,
+            None => DVec3::ONE,
+        };
+        if !scale.to_array().iter().all(|factor| SCALES.contains(factor)) {
+            let reason = format!("scale {scale} must lie in 0.1 to 10 along every axis");
+            return Err(LayoutError::Value { name: spec.name.clone(), reason });
+        }
+        let hue_deg = spec.hue_deg.as_ref().map(|hue| evaluate(&spec.name, hue, scope)).transpose()?;
+        Ok(Make { scale, hue_deg })
+    }
+
+    /// Stretches sizes and places along the object's axes, angles kept, and turns the hue.
+    fn apply(&self, mut built: BuiltSolid) -> BuiltSolid {
+        built.placed.solid = match built.placed.solid {
+            Solid::Box { size } => Solid::Box { size: size * self.scale },
+            Solid::Cylinder { radius, height } => {
+                Solid::Cylinder { radius: radius * (self.scale.x * self.scale.y).sqrt(), height: height * self.scale.z }
+            }
+        };
+        built.placed.pose.translation *= self.scale;
+        if let Some(hue_deg) = self.hue_deg {
+            built.color = with_hue(built.color, hue_deg);
+        }
+        built
+    }
+}
+
+/// The colour with another hue, its saturation and brightness (HSV) kept: greys stay grey.
+fn with_hue(color: [u8; 3], hue_deg: f64) -> [u8; 3] {
+    let [high, low] = [f64::from(color.into_iter().fold(0, u8::max)), f64::from(color.into_iter().fold(255, u8::min))];
+    let channel = |offset: f64| {
+        let sector = (offset + hue_deg.rem_euclid(360.0) / 60.0) % 6.0;
+        let share = sector.min(4.0 - sector).clamp(0.0, 1.0);
+        (high - (high - low) * share).round() as u8
+    };
+    [channel(5.0), channel(3.0), channel(1.0)]
 }
 
 /// How much each edge grows and how wide the bevel is. Three numbers are always drawn, so that one object's share

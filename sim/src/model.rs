@@ -7,7 +7,7 @@ use acm_concept::{
     solid::{PlacedSolid, Solid},
     suggest::suggest,
 };
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use include_dir::{Dir, include_dir};
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -56,6 +56,9 @@ pub(crate) enum ModelSolid {
         /// Heading about z, degrees. Default: 0.
         #[serde(default)]
         yaw_deg: f64,
+        /// Turn about its own y axis after the heading, degrees: positive lowers its +x end. Default: 0.
+        #[serde(default)]
+        tilt_deg: f64,
         /// Colour.
         color: Color,
     },
@@ -104,9 +107,10 @@ fn half() -> f64 {
 impl ModelSolid {
     pub(crate) fn placed(&self) -> PlacedSolid {
         match *self {
-            ModelSolid::Box { size, position, yaw_deg, .. } => PlacedSolid {
+            ModelSolid::Box { size, position, yaw_deg, tilt_deg, .. } => PlacedSolid {
                 solid: Solid::Box { size: size.into() },
-                pose: Pose::from_yaw(position.into(), yaw_deg.to_radians()),
+                pose: Pose::from_yaw(position.into(), yaw_deg.to_radians())
+                    * Pose::new(DVec3::ZERO, DQuat::from_rotation_y(tilt_deg.to_radians())),
             },
             ModelSolid::Cylinder { radius, height, position, .. } => {
                 PlacedSolid { solid: Solid::Cylinder { radius, height }, pose: Pose::from_translation(position.into()) }
@@ -218,7 +222,7 @@ mod tests {
         for name in library.names() {
             let bottom = |solid: &ModelSolid| {
                 let placed = solid.placed();
-                placed.pose.translation.z - placed.solid.half_extents().z
+                placed.pose.translation.z - placed.half_extents().z
             };
             let lowest = library.get(name).unwrap().solid.iter().map(bottom).fold(f64::INFINITY, f64::min);
             assert!(lowest.abs() < 1e-9, "{name} does not stand on its base frame");

@@ -4,7 +4,7 @@ use crate::scenario::{JudgeSpec, PredicateSpec};
 use acm_concept::expression::Expression;
 use serde::Serialize;
 
-const OBJECT_VARIABLES: [&str; 8] = ["x", "y", "z", "speed", "spin", "tilt", "moved", "touched"];
+const OBJECT_VARIABLES: [&str; 9] = ["x", "y", "z", "speed", "spin", "tilt", "moved", "turned", "touched"];
 const BUTTON_VARIABLES: [&str; 3] = ["pressed", "presses", "depth"];
 const WORLD_VARIABLES: [&str; 7] =
     ["others_moved", "commanded_opening", "pad_contact", "tcp_x", "tcp_y", "tcp_z", "time"];

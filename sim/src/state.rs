@@ -6,6 +6,7 @@ use crate::{
     scenario::{Scenario, WorldSpec},
     world::World,
 };
+use acm_concept::pose::wrap_angle;
 use glam::DVec3;
 
 /// Names of all variables, in the order in which [`fill`] writes their values.
@@ -45,6 +46,7 @@ pub(crate) fn fill(world: &World, values: &mut Vec<f64>) {
         let up = pose.transform_vector(DVec3::Z);
         values.extend(pose.translation.to_array());
         values.extend([speed, spin, up.z.clamp(-1.0, 1.0).acos(), pose.translation.distance(body.start.translation)]);
+        values.push(wrap_angle(pose.yaw() - body.start.yaw()).abs());
         values.push(world.contacts.pads_touching(&body.colliders) as f64);
         if let Some(button) = &body.button {
             values.extend([f64::from(u8::from(button.pressed)), f64::from(button.presses), body.depth(physics)]);

@@ -224,6 +224,11 @@ impl World {
         self.state = values;
     }
 
+    /// Whether someone stands before a camera.
+    pub(crate) fn is_covered(&self, camera: usize) -> bool {
+        self.events.iter().any(|event| event.covers(camera))
+    }
+
     /// What the hand measures.
     pub(crate) fn feedback(&self) -> Feedback {
         let tcp = self.gripper.tcp(&self.physics);

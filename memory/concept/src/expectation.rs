@@ -22,6 +22,8 @@ pub struct ExpectedObject {
     pub appearance: Appearance,
     /// Probability that it is where predicted, 0-1.
     pub confidence: f64,
+    /// In how many frames it was seen: how settled its parameters are.
+    pub views: u32,
     /// Whether the hand holds it.
     pub held: bool,
 }

@@ -37,7 +37,8 @@ pub struct ParameterEstimate {
 /// A pose with its uncertainty.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PoseEstimate {
-    /// Pose of the part's base frame in the world: origin at the middle of its bottom, z up for upright parts.
+    /// Pose of the part's frame in the world. The main part's is the template's base frame: origin at the middle of
+    /// the bottom, z up for upright objects.
     pub pose: Pose,
     /// Standard deviation along the world's axes, metres.
     pub position_sigma_m: DVec3,
@@ -50,7 +51,9 @@ pub struct PoseEstimate {
 pub struct GroundedPart {
     /// Template type tau.
     pub template: String,
-    /// Parameters Theta, in the template's order.
+    /// Which of the template's parts it is ([`WHOLE`](crate::template::WHOLE) where the template has but one).
+    pub name: String,
+    /// Parameters Theta, in the template's order. The parts of one template share them.
     pub parameters: Vec<ParameterEstimate>,
     /// Pose T.
     pub pose: PoseEstimate,

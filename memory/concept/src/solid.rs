@@ -125,6 +125,20 @@ impl PlacedSolid {
     pub fn signed_distance(&self, point: DVec3) -> f64 {
         self.solid.signed_distance(self.pose.inverse().transform_point(point))
     }
+    /// Half of the extents along the parent's axes of the box round the turned solid. Metres.
+    ///
+    /// ```
+    /// # use acm_concept::{pose::Pose, solid::{PlacedSolid, Solid}};
+    /// # use glam::DVec3;
+    /// let bar = Solid::Box { size: DVec3::new(0.2, 0.04, 0.02) };
+    /// let turned = PlacedSolid { solid: bar, pose: Pose::from_yaw(DVec3::ZERO, std::f64::consts::FRAC_PI_2) };
+    /// assert!((turned.half_extents() - DVec3::new(0.02, 0.1, 0.01)).length() < 1e-12);
+    /// ```
+    pub fn half_extents(&self) -> DVec3 {
+        let half = self.solid.half_extents();
+        let axis = |unit: DVec3, length: f64| self.pose.transform_vector(unit).abs() * length;
+        axis(DVec3::X, half.x) + axis(DVec3::Y, half.y) + axis(DVec3::Z, half.z)
+    }
     /// As [`Solid::intersect_ray`], with the ray in the parent frame.
     pub fn intersect_ray(&self, origin: DVec3, direction: DVec3) -> Option<(f64, f64)> {
         let inverse = self.pose.inverse();

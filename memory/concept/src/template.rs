@@ -21,6 +21,8 @@ use thiserror::Error;
 pub const MAX_TEMPLATE_BYTES: usize = 64 * 1024;
 /// Most parameters of one template.
 pub const MAX_PARAMETERS: usize = 24;
+/// Most parts of one template.
+pub const MAX_PARTS: usize = 16;
 
 /// Parameter values by name, as [`Expression::evaluate`] takes them.
 pub type Values<'a> = [(&'a str, f64)];
@@ -93,9 +95,27 @@ pub struct Synopsis {
     pub nouns: Vec<Noun>,
 }
 
-/// A solid as expressions over the parameters.
+/// A part of an object that is described by one template: a frame that moves with the parameters, and what the part
+/// affords. A template that names no parts has one, [`WHOLE`], whose frame is the base frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PartSpec {
+    /// Name: `base`, `lid`.
+    pub name: String,
+    /// Affordance words of this part.
+    pub affordances: Vec<String>,
+    position: [Expression; 3],
+    /// Rotation about the base frame's y axis, radians.
+    tilt: Expression,
+}
+
+/// The name of the part of templates that name none.
+pub const WHOLE: &str = "whole";
+
+/// A solid as expressions over the parameters, in the frame of its part.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SolidSpec {
+    /// Index of the part it belongs to.
+    part: usize,
     shape: ShapeSpec,
     position: [Expression; 3],
 }
@@ -184,8 +204,8 @@ pub struct Template {
     pub seen_by: SeenBy,
     /// Prior odds against other templates that fit as well, 1 for the plain ones.
     pub prior: f64,
-    /// Affordance words.
-    pub affordances: Vec<String>,
+    /// Parts P_i, the main one first: manipulation functions are bound to it.
+    pub parts: Vec<PartSpec>,
     /// Parameter space Omega.
     pub parameters: Vec<ParameterSpec>,
     /// Further conditions that parameters must meet together.
@@ -250,6 +270,16 @@ pub enum TemplateError {
         /// The frames there are.
         known: String,
     },
+    /// A solid that names a part which the template does not have.
+    #[error("template file {file}: a solid belongs to part `{part}`, which is not among: {known}")]
+    UnknownPart {
+        /// The file's name.
+        file: String,
+        /// The part it names.
+        part: String,
+        /// The parts there are.
+        known: String,
+    },
     /// Two files declare the same template type.
     #[error("template file {file}: the template type `{name}` is declared twice")]
     Duplicate {
@@ -265,9 +295,32 @@ impl Template {
     pub fn parse(file: &str, text: &str) -> Result<Template, TemplateError> {
         raw::parse(file, text)
     }
-    /// The solids of a part with the given parameter values, in its base frame.
+    /// The solids of all parts with the given parameter values, in the base frame.
     pub fn solids(&self, values: &Values) -> Result<Vec<PlacedSolid>, ExpressionError> {
-        self.solids.iter().map(|spec| spec.evaluate(values)).collect()
+        let frames = self.part_frames(values)?;
+        let place = |spec: &SolidSpec| {
+            let local = spec.evaluate(values)?;
+            let frame = frames.get(spec.part).copied().unwrap_or(Pose::IDENTITY);
+            Ok(PlacedSolid { solid: local.solid, pose: frame * local.pose })
+        };
+        self.solids.iter().map(place).collect()
+    }
+    /// The frames of the parts in the base frame, in their order.
+    pub fn part_frames(&self, values: &Values) -> Result<Vec<Pose>, ExpressionError> {
+        let frame = |part: &PartSpec| {
+            let tilt = glam::DQuat::from_rotation_y(part.tilt.evaluate(values)?);
+            Ok(Pose::new(vector(&part.position, values)?, tilt))
+        };
+        self.parts.iter().map(frame).collect()
+    }
+    /// The solids of one part, in that part's frame; none if the template has no part of that name.
+    pub fn part_solids(&self, part: &str, values: &Values) -> Result<Vec<PlacedSolid>, ExpressionError> {
+        let index = self.parts.iter().position(|spec| spec.name == part);
+        self.solids.iter().filter(|spec| Some(spec.part) == index).map(|spec| spec.evaluate(values)).collect()
+    }
+    /// Affordance words of all parts.
+    pub fn affordances(&self) -> impl Iterator<Item = &str> {
+        self.parts.iter().flat_map(|part| part.affordances.iter().map(String::as_str))
     }
     /// A frame of a part with the given parameter values, in its base frame; `None` if there is no such frame.
     pub fn frame(&self, name: &str, values: &Values) -> Result<Option<Pose>, ExpressionError> {
@@ -357,6 +410,11 @@ impl TemplateLibrary {
     /// A template by type.
     pub fn get(&self, name: &str) -> Option<&Template> {
         self.templates.get(name)
+    }
+    /// The solids of a grounded part, in its own frame; `None` if its template is not in the library or cannot be
+    /// evaluated at its parameters.
+    pub fn solids_of(&self, part: &crate::object::GroundedPart) -> Option<Vec<PlacedSolid>> {
+        self.get(&part.template)?.part_solids(&part.name, &part.values()).ok()
     }
     /// All templates in the order of their names.
     pub fn iter(&self) -> impl Iterator<Item = &Template> {

@@ -25,6 +25,8 @@ pub(crate) struct Model<'a> {
     pub template: &'a Template,
     /// Whether the heading is fitted.
     pub turns: bool,
+    /// Whether half a turn makes a difference.
+    two_ends: bool,
     pub base: Base,
     /// Indices of the fitted parameters.
     free: Vec<usize>,
@@ -49,12 +51,17 @@ impl<'a> Model<'a> {
     pub fn new(template: &'a Template, initial: Vec<f64>, base: Base) -> Option<Model<'a>> {
         let symmetry = template.yaw_symmetry(&template.named(&initial)).ok()?;
         let free = (0..template.parameters.len()).filter(|&i| !template.parameters[i].fixed).collect();
-        Some(Model { template, turns: symmetry != YawSymmetry::Continuous, base, free, initial })
+        let two_ends = matches!(symmetry, YawSymmetry::Fold(fold) if fold % 2 == 1);
+        Some(Model { template, turns: symmetry != YawSymmetry::Continuous, two_ends, base, free, initial })
     }
     /// A model whose parameters stay at `values`: only its place is fitted.
     pub fn rigid(template: &'a Template, values: Vec<f64>, base: Base) -> Option<Model<'a>> {
         let model = Model::new(template, values, base)?;
         Some(Model { free: Vec::new(), ..model })
+    }
+    /// Whether half a turn makes a difference.
+    pub fn has_two_ends(&self) -> bool {
+        self.two_ends
     }
     /// Index of the heading in the state.
     pub fn yaw_index(&self) -> Option<usize> {

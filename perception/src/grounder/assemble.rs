@@ -8,7 +8,7 @@ use crate::{
 use acm_concept::{
     object::{GroundedObject, GroundedPart, Observability, ParameterEstimate, PixelSupport, PoseEstimate},
     pose::Pose,
-    template::{Unit, YawSymmetry},
+    template::{PartSpec, Unit, YawSymmetry},
 };
 use glam::{DQuat, DVec2, DVec3};
 
@@ -41,11 +41,11 @@ pub(super) fn object(
     // What is cut off all round may be anything.
     let whole = 1.0 - 0.6 * evidence.cut_share();
     let explained = on_surface * (0.4 + 0.6 * on_outline) * whole;
-    let part = part(scene, best, evidence, appearance)?;
+    let parts = parts(scene, best, evidence, appearance)?;
     Some(GroundedObject {
         category: category.clone(),
         categories,
-        parts: vec![part],
+        parts,
         appearance,
         confidence: (certainty * explained * (1.0 - (-(pixels.len() as f64) / 150.0).exp())).clamp(0.0, 1.0),
         truncated: evidence.cut_share() > CUT_SHARE,
@@ -61,12 +61,13 @@ fn inner(scene: &Scene, mask: &[bool], pixels: &[usize]) -> Vec<usize> {
     if inner.len() * 3 > pixels.len() { inner } else { pixels.to_vec() }
 }
 
-fn part(
+/// The parts of the fitted template, the main one first: each in its own frame, with the parameters they share.
+fn parts(
     scene: &Scene,
     hypothesis: &Hypothesis,
     evidence: &Evidence,
     appearance: acm_concept::color::Appearance,
-) -> Option<GroundedPart> {
+) -> Option<Vec<GroundedPart>> {
     let (model, minimum) = (&hypothesis.model, &hypothesis.minimum);
     let template = model.template;
     let placement = model.placement(&minimum.state);
@@ -94,15 +95,18 @@ fn part(
         calibration.length(model.base_index().map_or(0.0, deviation)),
     );
     let yaw_sigma_rad = model.yaw_index().map_or(0.01, |i| calibration.angle(deviation(i), reach));
-    let pose = PoseEstimate { pose: world_pose(scene, &placement.pose, symmetry), position_sigma_m, yaw_sigma_rad };
-    Some(GroundedPart {
+    let base = world_pose(scene, &placement.pose, symmetry);
+    let part = |(index, (spec, frame)): (usize, (&PartSpec, Pose))| GroundedPart {
         template: template.name.clone(),
-        parameters,
-        pose,
-        affordances: template.affordances.clone(),
-        functions: template.functions.iter().map(|f| f.name.clone()).collect(),
+        name: spec.name.clone(),
+        parameters: parameters.clone(),
+        pose: PoseEstimate { pose: base * frame, position_sigma_m, yaw_sigma_rad },
+        affordances: spec.affordances.clone(),
+        functions: if index == 0 { template.functions.iter().map(|f| f.name.clone()).collect() } else { Vec::new() },
         appearance,
-    })
+    };
+    let frames = template.part_frames(&named).ok()?;
+    Some(template.parts.iter().zip(frames).enumerate().map(part).collect())
 }
 
 fn deviation(hypothesis: &Hypothesis, index: usize) -> f64 {

@@ -200,6 +200,7 @@ fn blindness_is_an_answer() {
 /// What a memory would expect after these percepts: the same things in the same places.
 fn remembered(percepts: &Percepts) -> Expectation {
     let object = |(i, o): (usize, &GroundedObject)| ExpectedObject {
+        views: 1,
         id: ObjectId(i as u64),
         category: o.category.clone(),
         parts: o.parts.clone(),

@@ -72,7 +72,8 @@ fn a_seed_gives_one_layout() {
 fn impossible_rules_end_after_the_attempts() {
     let scenario = Scenario::open("put-back-block-jittered").unwrap();
     let mut world = scenario.world.clone();
-    world.rejects[0].nearer_than_m = 1.0;
+    let between = ["mat".into(), "mat".into()];
+    world.rejects[0].rule = RejectRule::Near { between, nearer_than_m: 1.0 };
     world.attempts = 10;
     assert_eq!(Layout::draw(&world, 0).unwrap_err(), LayoutError::Rejected { attempts: 10 });
 }

@@ -3,7 +3,7 @@
 use super::{
     Scenario, ScenarioError, nearest,
     raw::*,
-    spec::{PlaceAt, Reference, StageSpec, ViolationSpec},
+    spec::{DeedSpec, PlaceAt, Reference, StageSpec, ViolationSpec},
     *,
 };
 use crate::{
@@ -247,14 +247,13 @@ impl<'a> Meaning<'a> {
     }
 
     fn reject(&self, raw: &RawReject, draws: &[DrawSpec]) -> Result<RejectSpec, ScenarioError> {
-        let known = || self.objects().chain(self.raw.place.iter().map(|place| place.name.as_str()));
-        for name in &raw.between {
-            if !known().any(|candidate| candidate == name) {
-                let reason = format!("there is no object or place `{name}`{}", nearest(name, known()));
-                return Err(self.wrong("random.reject.between", reason));
+        let rule = match (&raw.between, raw.nearer_than_m, &raw.when) {
+            (Some(between), Some(nearer_than_m), None) => self.nearness(between, nearer_than_m)?,
+            (None, None, Some(when)) => {
+                RejectRule::When(self.expression("random.reject.when", when, &as_strs(&self.others()))?)
             }
-        }
-        self.within("random.reject.nearer_than_m", raw.nearer_than_m, 0.0, 10.0)?;
+            _ => return Err(self.wrong("random.reject", "needs either `between` and `nearer_than_m`, or `when`")),
+        };
         let redraw_from = match &raw.redraw_from {
             None => 0,
             Some(name) => draws.iter().position(|draw| draw.name == *name).ok_or_else(|| {
@@ -262,7 +261,19 @@ impl<'a> Meaning<'a> {
                 self.wrong("random.reject.redraw_from", format!("there is no draw `{name}`{}", nearest(name, names)))
             })?,
         };
-        Ok(RejectSpec { between: raw.between.clone(), nearer_than_m: raw.nearer_than_m, redraw_from })
+        Ok(RejectSpec { rule, redraw_from })
+    }
+
+    fn nearness(&self, between: &[String; 2], nearer_than_m: f64) -> Result<RejectRule, ScenarioError> {
+        let known = || self.objects().chain(self.raw.place.iter().map(|place| place.name.as_str()));
+        for name in between {
+            if !known().any(|candidate| candidate == name) {
+                let reason = format!("there is no object or place `{name}`{}", nearest(name, known()));
+                return Err(self.wrong("random.reject.between", reason));
+            }
+        }
+        self.within("random.reject.nearer_than_m", nearer_than_m, 0.0, 10.0)?;
+        Ok(RejectRule::Near { between: between.clone(), nearer_than_m })
     }
 
     fn object(&self, at: usize) -> Result<ObjectSpec, ScenarioError> {
@@ -300,6 +311,8 @@ impl<'a> Meaning<'a> {
             position: self.triple(&field, raw.position.as_ref().unwrap_or(&origin), &names)?,
             yaw: self.number(&field, raw.yaw.as_ref().unwrap_or(&Number::Plain(0.0)), &names)?,
             on: on.transpose()?,
+            scale: raw.scale.as_ref().map(|scale| self.triple(&field, scale, &names)).transpose()?,
+            hue_deg: raw.hue_deg.as_ref().map(|hue| self.number(&field, hue, &names)).transpose()?,
             perturb: raw.perturb,
         })
     }
@@ -320,7 +333,6 @@ impl<'a> Meaning<'a> {
         self.within(&format!("{field}.after_s"), raw.after_s, 0.0, 7200.0)?;
         self.within(&format!("{field}.over_s"), raw.over_s, 0.02, 600.0)?;
         self.within(&format!("{field}.lift_m"), raw.lift_m, 0.0, 2.0)?;
-        let carry = self.reference(&field, &raw.carry)?;
         let others = self.others();
         let objects = self.raw.object.iter().map(|object| self.visible_to_judge(object));
         let known = oracle::names(objects, &others);
@@ -330,12 +342,30 @@ impl<'a> Meaning<'a> {
             name: raw.name.clone(),
             after_s: raw.after_s,
             when,
-            carry,
-            to: self.triple(&field, &raw.to, &others)?,
-            yaw: self.number(&field, raw.yaw.as_ref().unwrap_or(&Number::Plain(0.0)), &others)?,
             over_s: raw.over_s,
-            lift_m: raw.lift_m,
+            deed: self.deed(&field, raw, &others)?,
         })
+    }
+
+    fn deed(&self, field: &str, raw: &RawEvent, names: &[&str]) -> Result<DeedSpec, ScenarioError> {
+        match (&raw.carry, &raw.to, raw.cover.as_slice()) {
+            (Some(carry), Some(to), []) => Ok(DeedSpec::Carry {
+                object: self.reference(field, carry)?,
+                to: self.triple(field, to, names)?,
+                yaw: self.number(field, raw.yaw.as_ref().unwrap_or(&Number::Plain(0.0)), names)?,
+                lift_m: raw.lift_m,
+            }),
+            (None, None, cover @ [_, ..]) => {
+                let known = || self.raw.camera.iter().map(|camera| camera.name.as_str());
+                let camera = |name: &String| {
+                    known().position(|camera| camera == name).ok_or_else(|| {
+                        self.wrong(field, format!("there is no camera `{name}`{}", nearest(name, known())))
+                    })
+                };
+                Ok(DeedSpec::Cover { cameras: cover.iter().map(camera).collect::<Result<_, _>>()? })
+            }
+            _ => Err(self.wrong(field, "needs either `carry` and `to`, or `cover`")),
+        }
     }
 
     fn judge(&self, world: &WorldSpec) -> Result<JudgeSpec, ScenarioError> {

@@ -7,8 +7,8 @@ mod spec;
 
 pub(crate) use raw::{Color, RawPerturb};
 pub(crate) use spec::{
-    CameraSpec, EventSpec, JudgeSpec, ObjectSpec, PlaceAt, PlaceSpec, PredicateSpec, Reference, RejectSpec,
-    SurfaceSpec, TaskTemplate, WorldSpec,
+    CameraSpec, DeedSpec, EventSpec, JudgeSpec, ObjectSpec, PlaceAt, PlaceSpec, PredicateSpec, Reference, RejectRule,
+    RejectSpec, SurfaceSpec, TaskTemplate, WorldSpec,
 };
 #[cfg(test)]
 pub(crate) use spec::{StageSpec, ViolationSpec};

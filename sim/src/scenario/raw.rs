@@ -275,14 +275,19 @@ pub(crate) enum RawDraw {
     },
 }
 
-/// Layouts in which two things are too near each other are drawn anew.
+/// Layouts in which two things are too near each other, or in which a condition holds, are drawn anew.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct RawReject {
     /// Two names of objects or places. The same name twice: any two copies of that object.
-    pub(crate) between: [String; 2],
-    /// Smallest gap between their solids, metres.
-    pub(crate) nearer_than_m: f64,
+    #[serde(default)]
+    pub(crate) between: Option<[String; 2]>,
+    /// Smallest gap between their solids, metres. Goes with `between`.
+    #[serde(default)]
+    pub(crate) nearer_than_m: Option<f64>,
+    /// A condition over plain draws and places, instead of `between`.
+    #[serde(default)]
+    pub(crate) when: Option<String>,
     /// The draw from which on all is drawn anew. Default: the first.
     #[serde(default)]
     pub(crate) redraw_from: Option<String>,
@@ -309,6 +314,13 @@ pub(crate) struct RawObject {
     /// The object that it stands on, declared before this one.
     #[serde(default)]
     pub(crate) on: Option<RawReference>,
+    /// Factors by which sizes and places of its solids are stretched along its axes; angles stay. Default: 1.
+    #[serde(default)]
+    pub(crate) scale: Option<[Number; 3]>,
+    /// Hue of its colours, degrees (0 red, 120 green, 240 blue), their saturation and brightness kept. Default: the
+    /// model's own.
+    #[serde(default)]
+    pub(crate) hue_deg: Option<Number>,
     /// Deviations of single copies from the model, drawn from a stream of their own.
     #[serde(default)]
     pub(crate) perturb: Option<RawPerturb>,
@@ -357,7 +369,7 @@ pub(crate) struct RawPlace {
     pub(crate) position: Option<[Number; 3]>,
 }
 
-/// A third party carries an object from where it is to another place.
+/// A third party carries an object from where it is to another place, or covers cameras for a while.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct RawEvent {
@@ -370,9 +382,15 @@ pub(crate) struct RawEvent {
     #[serde(default)]
     pub(crate) when: Option<String>,
     /// What is carried.
-    pub(crate) carry: RawReference,
-    /// Where its base frame comes to stand, metres. Expressions can use places and plain draws.
-    pub(crate) to: [Number; 3],
+    #[serde(default)]
+    pub(crate) carry: Option<RawReference>,
+    /// Names of the cameras that are covered instead: their frames are black and without depth, so that what happens
+    /// meanwhile is not seen.
+    #[serde(default)]
+    pub(crate) cover: Vec<String>,
+    /// Where the base frame of what is carried comes to stand, metres. Expressions can use places and plain draws.
+    #[serde(default)]
+    pub(crate) to: Option<[Number; 3]>,
     /// Its heading there, radians. Default: 0.
     #[serde(default)]
     pub(crate) yaw: Option<Number>,
@@ -387,8 +405,8 @@ pub(crate) struct RawEvent {
 /// How the outcome is judged, over the world's true state after every physics step.
 ///
 /// Variables: for every object without `count`: `NAME_x`, `NAME_y`, `NAME_z` (base frame, metres), `NAME_speed`
-/// (m/s), `NAME_spin` (rad/s), `NAME_tilt` (rad from upright), `NAME_moved` (metres from its start), `NAME_touched`
-/// (pads in contact with it); for buttons `NAME_pressed` (1 or 0), `NAME_presses` (count), `NAME_depth` (metres);
+/// (m/s), `NAME_spin` (rad/s), `NAME_tilt` (rad from upright), `NAME_moved` (metres from its start), `NAME_turned`
+/// (rad from its first heading), `NAME_touched` (pads in contact with it); for buttons `NAME_pressed` (1 or 0), `NAME_presses` (count), `NAME_depth` (metres);
 /// `PLACE_x`, `PLACE_y`, `PLACE_z`; `others_moved` (metres, the most that any object not listed in `moves` has
 /// moved); `commanded_opening` (share of the largest), `pad_contact` (pads in contact with anything, 0-2), `tcp_x`,
 /// `tcp_y`, `tcp_z`, `time` (seconds); plain draws under their names.

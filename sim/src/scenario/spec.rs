@@ -45,10 +45,16 @@ pub(crate) struct CameraSpec {
 
 #[derive(Debug, Clone)]
 pub(crate) struct RejectSpec {
-    pub(crate) between: [String; 2],
-    pub(crate) nearer_than_m: f64,
+    pub(crate) rule: RejectRule,
     /// Index of the first draw that is drawn anew.
     pub(crate) redraw_from: usize,
+}
+
+/// What makes a layout unusable.
+#[derive(Debug, Clone)]
+pub(crate) enum RejectRule {
+    Near { between: [String; 2], nearer_than_m: f64 },
+    When(Expression),
 }
 
 #[derive(Debug, Clone)]
@@ -59,6 +65,8 @@ pub(crate) struct ObjectSpec {
     pub(crate) position: [Expression; 3],
     pub(crate) yaw: Expression,
     pub(crate) on: Option<Reference>,
+    pub(crate) scale: Option<[Expression; 3]>,
+    pub(crate) hue_deg: Option<Expression>,
     pub(crate) perturb: Option<RawPerturb>,
 }
 
@@ -87,11 +95,23 @@ pub(crate) struct EventSpec {
     pub(crate) name: String,
     pub(crate) after_s: f64,
     pub(crate) when: Option<Expression>,
-    pub(crate) carry: Reference,
-    pub(crate) to: [Expression; 3],
-    pub(crate) yaw: Expression,
     pub(crate) over_s: f64,
-    pub(crate) lift_m: f64,
+    pub(crate) deed: DeedSpec,
+}
+
+/// What a third party does.
+#[derive(Debug, Clone)]
+pub(crate) enum DeedSpec {
+    Carry {
+        object: Reference,
+        to: [Expression; 3],
+        yaw: Expression,
+        lift_m: f64,
+    },
+    /// Indices of the cameras.
+    Cover {
+        cameras: Vec<usize>,
+    },
 }
 
 /// What the judge decides.

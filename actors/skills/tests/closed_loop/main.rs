@@ -29,7 +29,15 @@ fn part(pose: Pose) -> GroundedPart {
     let pose = PoseEstimate { pose, position_sigma_m: DVec3::splat(0.005), yaw_sigma_rad: 0.05 };
     let appearance = Appearance { mean: Lab { l: 50.0, a: 0.0, b: 0.0 }, spread: 2.0 };
     let (template, none) = ("box".into(), Vec::new());
-    GroundedPart { template, parameters: vec![], pose, affordances: none.clone(), functions: none, appearance }
+    GroundedPart {
+        template,
+        name: "whole".into(),
+        parameters: vec![],
+        pose,
+        affordances: none.clone(),
+        functions: none,
+        appearance,
+    }
 }
 
 fn invocation(kind: &str, base: Pose, frame_height_m: f64, arguments: &[(&str, f64)]) -> SkillInvocation {

@@ -1,24 +1,15 @@
 //! Plain geometry over remembered solids: outlines seen from above, tops, overlaps.
 
 use acm_concept::{
-    expression::ExpressionError,
     pose::Pose,
     solid::{PlacedSolid, Solid},
-    template::{TemplateLibrary, YawSymmetry},
+    template::YawSymmetry,
 };
 use acm_memory::{MemoryView, entry::ObjectEntry};
 use glam::{DVec2, DVec3};
 
 /// Corners of the polygon that stands for a circle.
 const CIRCLE_CORNERS: u32 = 12;
-
-/// Solids of one part in its base frame; an unknown template or an expression without value gives none.
-pub(crate) fn part_solids(
-    library: &TemplateLibrary,
-    part: &acm_concept::object::GroundedPart,
-) -> Result<Vec<PlacedSolid>, ExpressionError> {
-    library.get(&part.template).map_or(Ok(Vec::new()), |template| template.solids(&part.values()))
-}
 
 /// Solids of an object whose main part's base frame is at `base`, in the world.
 pub(crate) fn solids_at(view: &dyn MemoryView, entry: &ObjectEntry, base: &Pose) -> Vec<PlacedSolid> {
@@ -27,7 +18,7 @@ pub(crate) fn solids_at(view: &dyn MemoryView, entry: &ObjectEntry, base: &Pose)
     let mut placed = Vec::new();
     for part in &entry.parts {
         // A template file is checked when it is read; an expression that still has no value bounds nothing.
-        for solid in part_solids(view.library(), part).unwrap_or_default() {
+        for solid in view.library().solids_of(part).unwrap_or_default() {
             placed.push(PlacedSolid { solid: solid.solid, pose: shift * part.pose.pose * solid.pose });
         }
     }
@@ -103,8 +94,12 @@ fn outline(placed: &PlacedSolid) -> Vec<DVec2> {
     match placed.solid {
         Solid::Box { size } => {
             let half = size * 0.5;
+            // A box tilted about its y axis is seen from above as long as the shadow of both its length and height.
+            let shadow = |axis: DVec3, half: f64| placed.pose.transform_vector(axis).truncate() * half;
+            let along = shadow(DVec3::X, half.x);
+            let reach = (along.length() + shadow(DVec3::Z, half.z).length()) / along.length().max(1e-9);
             [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)]
-                .map(|(x, y)| flat(DVec3::new(x * half.x, y * half.y, 0.0)))
+                .map(|(x, y)| flat(DVec3::new(x * half.x * reach, y * half.y, 0.0)))
                 .to_vec()
         }
         Solid::Cylinder { radius, .. } => (0..CIRCLE_CORNERS)
@@ -116,13 +111,8 @@ fn outline(placed: &PlacedSolid) -> Vec<DVec2> {
     }
 }
 
-/// Parts are upright here: the z extent is that of the solid's own height.
 fn z_range(placed: &PlacedSolid) -> (f64, f64) {
-    let half = 0.5
-        * match placed.solid {
-            Solid::Box { size } => size.z,
-            Solid::Cylinder { height, .. } => height,
-        };
+    let half = placed.half_extents().z;
     (placed.pose.translation.z - half, placed.pose.translation.z + half)
 }
 

@@ -8,12 +8,13 @@ use super::{
 use crate::{
     decision::GiveUpCause,
     explanation::ResolvedReference,
-    task::{Destination, Direction, ObjectReference, Quantity, Rank, ReferenceIndex, Size},
+    task::{Destination, Direction, Goal, ObjectReference, Quantity, Rank, ReferenceIndex, Size},
 };
 use acm_concept::{ids::ObjectId, task::OnUnknown};
 use acm_memory::{
-    entry::{Moment, ObjectEntry, Presence},
-    query::{ObjectQuery, Retrieval},
+    entry::{HistoryEntry, Moment, ObjectEntry, PlaceCause, Presence},
+    moves::departures,
+    query::{ObjectQuery, PlaceReference, Retrieval},
 };
 use glam::DVec2;
 use rand::Rng;
@@ -127,6 +128,10 @@ impl<'a> Grounder<'a> {
         let began = self.began(reference.subtask);
         self.keep_best_named(reference, &mut contenders);
         keep_if_any(&mut contenders, |entry| known_at(entry, began));
+        keep_if_any(&mut contenders, |entry| !gone_at(entry, began));
+        if self.presupposes_move(index) {
+            keep_if_any(&mut contenders, |entry| moved_by(entry, began));
+        }
         if let Some(destination) = &reference.located {
             contenders = self.located(&contenders, destination, began, depth)?;
         }
@@ -140,6 +145,15 @@ impl<'a> Grounder<'a> {
             keep_rank(&mut contenders, rank, began);
         }
         Ok((retrieval, contenders))
+    }
+
+    /// "Put the cube back where it was" speaks of a cube that has been moved, unless the instruction itself has it moved
+    /// before.
+    fn presupposes_move(&self, index: ReferenceIndex) -> bool {
+        let moving = self.task.subtasks.iter().map(|subtask| &subtask.goal).find(|g| g.object() == index && g.moves());
+        let back = PlaceReference::BeforeMoved;
+        matches!(moving, Some(Goal::At { destination: Destination::History { object, reference }, .. })
+            if *object == index && *reference == back)
     }
 
     /// What "the other one" and "do not touch" rule out.
@@ -255,6 +269,22 @@ fn keep_if_any(contenders: &mut Vec<&ObjectEntry>, fits: impl Fn(&ObjectEntry) -
 /// Whether an object was known when the subtask that speaks of it began: what turned up later is not meant.
 fn known_at(entry: &ObjectEntry, began: Option<Moment>) -> bool {
     began.is_none_or(|began| entry.history.first().is_none_or(|first| first.moment <= began))
+}
+
+/// Whether an object was known to be no longer in its place, and nowhere else, when a subtask began.
+fn gone_at(entry: &ObjectEntry, began: Option<Moment>) -> bool {
+    let known = |h: &&HistoryEntry| began.is_none_or(|began| h.moment <= began);
+    entry
+        .history
+        .iter()
+        .rev()
+        .find(known)
+        .is_some_and(|last| last.place.is_none() && !matches!(last.cause, PlaceCause::Grasped(_)))
+}
+
+/// Whether an object was known to have left a place when a subtask began.
+fn moved_by(entry: &ObjectEntry, began: Option<Moment>) -> bool {
+    departures(entry).iter().any(|departure| began.is_none_or(|began| departure.by.moment <= began))
 }
 
 fn keep_rank(contenders: &mut Vec<&ObjectEntry>, rank: Rank, began: Option<Moment>) {

@@ -353,7 +353,7 @@ fn fits_role(library: &TemplateLibrary, noun: Option<&str>, role: &Role) -> bool
             .iter()
             .any(|f| f.effects.iter().any(|effect| effect.predicate == *predicate && !effect.negated)),
         Role::Function(name) => template.function(name).is_some(),
-        Role::Affordance(affordance) => template.affordances.iter().any(|known| known == affordance),
+        Role::Affordance(affordance) => template.affordances().any(|known| *known == **affordance),
         Role::Mentioned => true,
     })
 }

@@ -138,10 +138,11 @@ impl World {
             observability: Observability::Observed,
         };
         let part = GroundedPart {
+            name: acm_concept::template::WHOLE.into(),
             template: template.into(),
             parameters: values.iter().map(parameter).collect(),
             pose: PoseEstimate { pose, position_sigma_m: DVec3::splat(0.001), yaw_sigma_rad: 0.01 },
-            affordances: known.affordances.clone(),
+            affordances: known.affordances().map(String::from).collect(),
             functions: known.functions.iter().map(|f| f.name.clone()).collect(),
             appearance,
         };

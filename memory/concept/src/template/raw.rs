@@ -17,6 +17,8 @@ struct RawTemplate {
     parameter: Vec<RawParameter>,
     #[serde(default)]
     constraints: Vec<String>,
+    #[serde(default)]
+    part: Vec<RawPart>,
     solid: Vec<RawSolid>,
     #[serde(default)]
     frame: Vec<RawFrame>,
@@ -55,10 +57,22 @@ struct RawParameter {
 }
 
 #[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawPart {
+    name: String,
+    #[serde(default)]
+    affordances: Vec<String>,
+    #[serde(default = "origin")]
+    position: [String; 3],
+    #[serde(default = "zero")]
+    tilt: String,
+}
+
+#[derive(Deserialize)]
 #[serde(deny_unknown_fields, tag = "shape", rename_all = "kebab-case")]
 enum RawSolid {
-    Box { size: [String; 3], position: [String; 3] },
-    Cylinder { radius: String, height: String, position: [String; 3] },
+    Box { size: [String; 3], position: [String; 3], part: Option<String> },
+    Cylinder { radius: String, height: String, position: [String; 3], part: Option<String> },
 }
 
 #[derive(Deserialize)]
@@ -97,6 +111,9 @@ fn one() -> f64 {
 fn zero() -> String {
     "0".into()
 }
+fn origin() -> [String; 3] {
+    [zero(), zero(), zero()]
+}
 
 /// Names that the expression reader takes for numbers.
 const CONSTANTS: [&str; 6] = ["e", "E", "PI", "TAU", "π", "τ"];
@@ -134,6 +151,7 @@ impl Meaning<'_> {
         }
         // First, so that a bad parameter is named itself and not by the expressions that use it.
         let parameters = raw.parameter.iter().map(|p| self.parameter(p)).collect::<Result<_, _>>()?;
+        let parts = self.parts(raw)?;
         let frames = raw.frame.iter().map(|f| self.frame(f)).collect::<Result<Vec<_>, _>>()?;
         let symmetry = raw.symmetry.iter().map(|rule| {
             let when = rule.when.as_deref().map(|text| self.expression("symmetry", text)).transpose()?;
@@ -144,10 +162,10 @@ impl Meaning<'_> {
             synopsis: self.synopsis(&raw.synopsis)?,
             seen_by: raw.seen_by,
             prior: raw.prior,
-            affordances: raw.affordances.clone(),
             parameters,
             constraints: self.expressions("constraints", &raw.constraints)?,
-            solids: raw.solid.iter().map(|s| self.solid(s)).collect::<Result<_, _>>()?,
+            solids: raw.solid.iter().map(|s| self.solid(s, &parts)).collect::<Result<_, _>>()?,
+            parts,
             functions: raw.function.iter().map(|f| self.function(f, &frames)).collect::<Result<_, _>>()?,
             symmetry: symmetry.collect::<Result<_, _>>()?,
             frames,
@@ -202,15 +220,49 @@ impl Meaning<'_> {
         })
     }
 
-    fn solid(&self, raw: &RawSolid) -> Result<SolidSpec, TemplateError> {
-        let (shape, position) = match raw {
-            RawSolid::Box { size, position } => (ShapeSpec::Box { size: self.triple("solid", size)? }, position),
-            RawSolid::Cylinder { radius, height, position } => {
+    /// The parts that the file names; the template's own affordances are those of the main one.
+    fn parts(&self, raw: &RawTemplate) -> Result<Vec<PartSpec>, TemplateError> {
+        let whole = RawPart { name: WHOLE.into(), affordances: Vec::new(), position: origin(), tilt: zero() };
+        let named: Vec<&RawPart> =
+            if raw.part.is_empty() { vec![&whole] } else { raw.part.iter().take(MAX_PARTS + 1).collect() };
+        if named.len() > MAX_PARTS {
+            let reason = format!("has more than {MAX_PARTS} parts");
+            return Err(TemplateError::Format { file: self.file.into(), reason });
+        }
+        let part = |(index, raw_part): (usize, &&RawPart)| {
+            if named.iter().take(index).any(|other| other.name == raw_part.name) {
+                let reason = format!("the part `{}` is declared twice", raw_part.name);
+                return Err(TemplateError::Format { file: self.file.into(), reason });
+            }
+            let place = format!("part `{}`", raw_part.name);
+            let own = if index == 0 { raw.affordances.as_slice() } else { &[] };
+            Ok(PartSpec {
+                name: raw_part.name.clone(),
+                affordances: own.iter().chain(&raw_part.affordances).cloned().collect(),
+                position: self.triple(&place, &raw_part.position)?,
+                tilt: self.expression(&place, &raw_part.tilt)?,
+            })
+        };
+        named.iter().enumerate().map(part).collect()
+    }
+
+    fn solid(&self, raw: &RawSolid, parts: &[PartSpec]) -> Result<SolidSpec, TemplateError> {
+        let (shape, position, part) = match raw {
+            RawSolid::Box { size, position, part } => {
+                (ShapeSpec::Box { size: self.triple("solid", size)? }, position, part)
+            }
+            RawSolid::Cylinder { radius, height, position, part } => {
                 let (radius, height) = (self.expression("solid", radius)?, self.expression("solid", height)?);
-                (ShapeSpec::Cylinder { radius, height }, position)
+                (ShapeSpec::Cylinder { radius, height }, position, part)
             }
         };
-        Ok(SolidSpec { shape, position: self.triple("solid", position)? })
+        let named = |name: &String| parts.iter().position(|part| part.name == *name);
+        let part = part.as_ref().map_or(Some(0), named).ok_or_else(|| TemplateError::UnknownPart {
+            file: self.file.into(),
+            part: part.clone().unwrap_or_default(),
+            known: parts.iter().map(|part| part.name.as_str()).collect::<Vec<_>>().join(", "),
+        })?;
+        Ok(SolidSpec { part, shape, position: self.triple("solid", position)? })
     }
 
     fn frame(&self, raw: &RawFrame) -> Result<FrameSpec, TemplateError> {
