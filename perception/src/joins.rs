@@ -15,7 +15,7 @@ use std::collections::BTreeSet;
 /// Most joins in one frame.
 const MAX_JOINS: usize = 24;
 /// Colours of the parts of one thing that are joined by their shape differ by less, in the units of a tint.
-const SAME_TINT: f64 = 12.0;
+const SAME_TINT: f32 = 12.0;
 /// Tops of pieces of one thing are level within this.
 const LEVEL_M: f64 = 0.016;
 
