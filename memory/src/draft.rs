@@ -55,7 +55,7 @@ impl<'a> Draft<'a> {
     /// Adds the staged objects, with what was added to their histories.
     pub(crate) fn emit_stage(&mut self, stage: Stage, evidence: &[Evidence]) {
         for (id, staged) in stage.objects {
-            let Staged { entry, track, new, left, placed } = staged;
+            let Staged { entry, mut track, new, left, placed } = staged;
             let place = entry.place();
             let believed = |entry: ObjectEntry, track| Change::Object(Box::new(Believed { entry, track }));
             let history = |place, cause, verified, moment| HistoryEntry { moment, place, cause, verified };
@@ -63,6 +63,9 @@ impl<'a> Draft<'a> {
             if new {
                 // A history needs the object to be there.
                 self.emit(evidence.to_vec(), believed(entry.clone(), track.clone()));
+            }
+            if placed.is_none() && left.is_some() {
+                track.anchor = None;
             }
             if let Some(cause) = left {
                 let entry = history(None, cause, matches!(cause, PlaceCause::Grasped(_)), self.moment);

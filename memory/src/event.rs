@@ -110,6 +110,42 @@ pub struct Track {
     pub unconfirmed: Option<TransitionId>,
     /// Whether an own action may have shifted it since it was last seen.
     pub disturbed: bool,
+    /// Where it stands as its first views in this place had it, and how many views that is the mean of. A thing that
+    /// creeps away in steps below the noise leaves it.
+    #[serde(default)]
+    pub anchor: Option<Anchor>,
+    /// Set while it may be another object than it is taken for.
+    #[serde(default)]
+    pub doubt: Option<Box<crate::identity::doubt::Doubt>>,
+}
+
+/// The spot at which an object came to stand.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Anchor {
+    /// Position of the main part's base frame in the world, metres.
+    pub position: glam::DVec3,
+    /// How many views it is the mean of.
+    pub views: u32,
+}
+
+impl Anchor {
+    /// From so many views on it stays where it is.
+    const SETTLED: u32 = 8;
+
+    /// The anchor with one more view.
+    pub fn seen_at(anchor: Option<Anchor>, position: glam::DVec3) -> Anchor {
+        match anchor {
+            Some(anchor) if anchor.views >= Anchor::SETTLED => anchor,
+            Some(Anchor { position: mean, views }) => {
+                Anchor { position: mean + (position - mean) / f64::from(views + 1), views: views + 1 }
+            }
+            None => Anchor { position, views: 1 },
+        }
+    }
+    /// Whether it is the mean of enough views to be held against another.
+    pub fn is_settled(&self) -> bool {
+        self.views >= Anchor::SETTLED / 2
+    }
 }
 
 /// A view that contradicts what is believed.

@@ -34,7 +34,8 @@ pub(crate) fn expect(state: &State, now: Time) -> Expectation {
             parts,
             appearance: entry.appearance,
             confidence: entry.confidence,
-            views: entry.views,
+            // What may be another object is measured anew, not by what it is taken for.
+            views: if track.doubt.is_some() { 0 } else { entry.views },
             held,
         }
     };

@@ -23,9 +23,11 @@ pub fn departures(entry: &ObjectEntry) -> Vec<Departure<'_>> {
     let mut departures = Vec::new();
     let mut standing: Option<(&HistoryEntry, Place)> = None;
     for by in &entry.history {
-        if let Some((from, place)) = standing
-            && by.place.is_none_or(|now| seen_from_above(&now, &place) > MOVED_M)
-        {
+        if let Some((from, place)) = standing {
+            if by.place.is_some_and(|now| seen_from_above(&now, &place) <= MOVED_M) {
+                // Still there: what creeps away in small steps leaves from where it began.
+                continue;
+            }
             departures.push(Departure { from, place, by });
         }
         standing = by.place.map(|place| (by, place));

@@ -3,11 +3,11 @@
 use crate::{
     draft::{Draft, Stage, Staged},
     entry::{Moment, ObjectEntry, PlaceCause, Presence},
-    event::{Change, Glance, Pending},
+    event::{Anchor, Change, Glance, Pending, Track},
     fusion,
     geometry::Body,
     hand::HandFeeling,
-    identity::{self, IdentityRule, MAX_PERCEPTS, Match, Percept, predict},
+    identity::{self, IdentityRule, MAX_PERCEPTS, Match, Percept, doubt::Doubt, predict},
     observation::{Grounding, Observation, Resolved},
     scene,
     state::MAX_OBJECTS,
@@ -28,6 +28,8 @@ const LOW_CONFIDENCE: f64 = 0.3;
 const PLACE_GATE: f64 = 16.0;
 /// A thing that is found within this distance of its place has not moved, metres.
 pub(crate) const MOVED_M: f64 = 0.02;
+/// How far a thing that is moved by hand goes from one view to the next, metres.
+const STRIDE_M: f64 = 0.06;
 /// A share of the predicted pixels that were looked through that is strong evidence of absence.
 const STRONG_ABSENCE: f64 = 0.5;
 /// A share that is enough on its own.
@@ -142,6 +144,7 @@ impl Frame<'_, '_, '_> {
         let seen_through = self.views.iter().any(|v| v.object == id && v.visibility == Visibility::SeenThrough);
         let confused = self.confused_with(id);
         let library = self.draft.library;
+        let doubt = self.doubt(id, percept, found);
         let staged = self.stage.touch(&self.draft.state, id)?;
         let earlier_run = staged.entry.last_seen.episode < moment.episode;
         let low = percept.object.confidence < LOW_CONFIDENCE;
@@ -172,12 +175,29 @@ impl Frame<'_, '_, '_> {
             staged.entry.last_frame = Some(frame_of(cause)?);
             if !found.alternatives.is_empty() {
                 staged.entry.ambiguous_with.clone_from(&found.alternatives);
+                staged.track.doubt = doubt;
+            } else if let Some(doubt) = &mut staged.track.doubt {
+                doubt.see(percept, library);
+                staged.entry.ambiguous_with = doubt.alternatives(library);
             } else if staged.placed.is_some() {
                 staged.entry.ambiguous_with = confused;
             }
         }
         let probability = found.probability;
         Some(Resolved { percept: percept.index, object: id, new: false, probability, accepted })
+    }
+
+    /// The doubt that an assignment leaves on a whole view: how those that it may be looked before is kept.
+    fn doubt(&self, id: ObjectId, percept: &Percept<'_>, found: &Match) -> Option<Box<Doubt>> {
+        if found.alternatives.is_empty() || percept.object.truncated {
+            return None;
+        }
+        let own = std::iter::once((id, found.probability));
+        let candidates: Vec<(&ObjectEntry, f64)> = own
+            .chain(found.alternatives.iter().copied())
+            .filter_map(|(id, probability)| Some((self.draft.state.object(id)?, probability)))
+            .collect();
+        Doubt::new(percept, &candidates, self.draft.library).map(Box::new)
     }
 
     /// Present objects that may in truth be this one: their doubt is this one's too.
@@ -197,7 +217,8 @@ impl Frame<'_, '_, '_> {
     ) -> Option<Resolved> {
         let object = percept.object;
         let full = self.draft.state.objects.len() + self.stage.added() >= MAX_OBJECTS;
-        if object.confidence < FALSE_ALARM || full || self.is_fragment(percept, matches) {
+        let piece = self.is_piece_of_known(percept, found, matches) || self.is_fragment(percept, matches);
+        if object.confidence < FALSE_ALARM || full || piece {
             return None;
         }
         let id = ObjectId(self.draft.state.next.object + self.stage.added() as u64);
@@ -222,6 +243,21 @@ impl Frame<'_, '_, '_> {
         self.stage.add(entry, cause);
         let probability = found.probability;
         Some(Resolved { percept: percept.index, object: id, new: true, probability, accepted: true })
+    }
+
+    /// Whether a newcomer that something cuts off may as well be a piece of what this frame shows beside it: a thing
+    /// half hidden is seen in pieces, and only one of them can be given its identity.
+    fn is_piece_of_known(&self, percept: &Percept<'_>, found: &Match, matches: &[Match]) -> bool {
+        let beside = |other: &&Match| {
+            let known = self.percepts.get(other.percept);
+            let of = other.object.and_then(|id| self.stage.entry(&self.draft.state, id));
+            known.zip(of).is_some_and(|(known, entry)| {
+                let reach = Body::of(&entry.parts, self.draft.library).map_or(0.0, |body| body.extents()[0]);
+                known.body.centre.distance(percept.body.centre) < reach
+            })
+        };
+        let may_be = |other: &&Match| found.alternatives.iter().any(|(id, _)| other.object == Some(*id));
+        percept.object.truncated && matches.iter().filter(may_be).any(|other| beside(&other))
     }
 
     /// Whether a newcomer lies inside something that this frame shows as well: two solids cannot share a place, so
@@ -297,7 +333,7 @@ fn judge(
     library: &acm_concept::template::TemplateLibrary,
 ) -> View {
     let (entry, track) = (&staged.entry, &staged.track);
-    let in_place = is_in_place(entry, percept, library);
+    let in_place = is_in_place(entry, percept, library) && !has_crept(staged, percept);
     if entry.presence == Presence::Held && in_place {
         return View::InHand;
     }
@@ -339,11 +375,21 @@ fn is_in_place(entry: &ObjectEntry, percept: &Percept<'_>, library: &acm_concept
     near || (offset * offset / variance).element_sum() <= PLACE_GATE
 }
 
+/// Whether a whole view shows the object away from the spot at which it came to stand, although each step on the way
+/// was within the noise.
+fn has_crept(staged: &Staged, percept: &Percept<'_>) -> bool {
+    let anchor = staged.track.anchor.filter(Anchor::is_settled);
+    let off = |anchor: Anchor| (percept.pose.pose.translation - anchor.position).truncate().length() > MOVED_M;
+    staged.entry.presence == Presence::Present && !percept.object.truncated && anchor.is_some_and(off)
+}
+
+/// Whether two views in a row tell of the same departure: the second shows the object where the first did, or a
+/// little farther on its way.
 fn agrees(pending: &[GroundedPart], percept: &Percept<'_>, library: &acm_concept::template::TemplateLibrary) -> bool {
     let near = pending.first().is_some_and(|part| {
         let offset = part.pose.pose.translation - percept.pose.pose.translation;
         let sigma = part.pose.position_sigma_m + percept.pose.position_sigma_m + predict::VIEW_SIGMA_M;
-        (offset * offset / (sigma * sigma)).element_sum() <= PLACE_GATE
+        offset.length() <= STRIDE_M || (offset * offset / (sigma * sigma)).element_sum() <= PLACE_GATE
     });
     near && fusion::fuse_parts(pending, &percept.parts, percept.object.truncated, library).is_some()
 }
@@ -357,10 +403,14 @@ fn relocated(mut parts: Vec<GroundedPart>, seen: &[GroundedPart]) -> Vec<Grounde
 }
 
 fn settle_place(staged: &mut Staged, parts: Vec<GroundedPart>, cause: Option<PlaceCause>) {
+    let position = parts.first().map(|part| part.pose.pose.translation);
+    let anchor = if cause.is_none() { staged.track.anchor } else { None };
     staged.entry.parts = parts;
     staged.entry.presence = Presence::Present;
     staged.placed = cause;
-    staged.track = Default::default();
+    let doubt = staged.track.doubt.take();
+    let anchor = position.map(|position| Anchor::seen_at(anchor, position));
+    staged.track = Track { anchor, doubt, ..Track::default() };
 }
 
 /// What every accepted view adds, wherever it shows the object.

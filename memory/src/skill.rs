@@ -32,7 +32,7 @@ pub(crate) fn candidates(
             "destination" => destination.map(Term::Place),
             _ => None,
         };
-        for function in &template.functions {
+        for function in template.functions.iter().filter(|function| part.functions.contains(&function.name)) {
             let ground = |literals: &[Literal]| -> Vec<Literal> {
                 literals.iter().map(|literal| literal.substitute(&bind)).collect()
             };

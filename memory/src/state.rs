@@ -123,7 +123,10 @@ impl State {
         if let Some(entry) = objects.get_mut(at) {
             let history = std::mem::take(&mut entry.history);
             *entry = ObjectEntry { history, ..believed.entry.clone() };
-            let place = entry.place();
+            let mut place = entry.place();
+            if let (Some(place), Some(anchor)) = (&mut place, believed.track.anchor) {
+                place.pose.translation = anchor.position;
+            }
             if let (Some(last), Some(place)) = (entry.history.last_mut(), place)
                 && last.place.is_some()
             {

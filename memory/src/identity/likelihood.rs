@@ -4,6 +4,7 @@
 //! Every Gaussian has a broad outlier class beside it: one wrong number must not split an identity.
 
 use super::{Percept, predict::Prediction};
+use crate::geometry::Body;
 use acm_concept::{
     color::Appearance,
     object::{GroundedPart, Observability, ParameterEstimate},
@@ -22,6 +23,10 @@ const ROOM_M3: f64 = 0.3;
 const GATE: f64 = 7.0;
 /// Squared Mahalanobis distance beyond which a place does not explain a percept.
 const PLACE_GATE: f64 = 25.0;
+/// A fragment fits within a thing if it is longer by no more than this factor.
+const FITS_WITHIN: f64 = 1.15;
+/// Likelihood ratio of a fragment that fits, whatever template was fitted to it.
+const FRAGMENT: f64 = 0.5;
 /// What perception's own hint is worth, natural logarithm of 3.
 const HINT: f64 = 1.1;
 
@@ -38,7 +43,7 @@ pub(crate) struct Scores {
 pub(crate) fn scores(percepts: &[Percept<'_>], predictions: &[Prediction], library: &TemplateLibrary) -> Scores {
     let mut scores = Scores { pairs: Vec::with_capacity(percepts.len()), new: Vec::with_capacity(percepts.len()) };
     for percept in percepts {
-        let looks: Vec<f64> = predictions.iter().map(|prediction| look_ratio(percept, prediction, library)).collect();
+        let looks: Vec<f64> = predictions.iter().map(|known| look_ratio(Look::seen(percept), Look::known(known), library)).collect();
         let alike = looks.iter().map(|look| look.exp()).sum::<f64>() / (looks.len().max(1) as f64);
         let new = NEW.ln() + (1.0 - TWIN + TWIN * alike).ln();
         let pair = |(index, (prediction, look)): (usize, (&Prediction, &f64))| {
@@ -79,13 +84,36 @@ pub(crate) fn fragment_slack_m(percept: &Percept<'_>, prediction: &Prediction) -
     if partial { 0.5 * (known[0] - seen[0]).max(known[1] - seen[1]).max(0.0) } else { 0.0 }
 }
 
+/// What something looks like wherever it is.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Look<'a> {
+    pub(crate) parts: &'a [GroundedPart],
+    pub(crate) appearance: &'a Appearance,
+    pub(crate) body: &'a Body,
+    /// Whether something cuts its outline off.
+    pub(crate) truncated: bool,
+}
+
+impl<'a> Look<'a> {
+    /// Of a percept.
+    pub(crate) fn seen(percept: &'a Percept<'_>) -> Look<'a> {
+        let Percept { object, parts, body, .. } = percept;
+        Look { parts, appearance: &object.appearance, body, truncated: object.truncated }
+    }
+    /// Of a remembered object.
+    pub(crate) fn known(prediction: &'a Prediction) -> Look<'a> {
+        let Prediction { parts, appearance, body, .. } = prediction;
+        Look { parts, appearance, body, truncated: false }
+    }
+}
+
 /// Log ratio of everything but the place: template, parameters, colour.
-pub(crate) fn look_ratio(percept: &Percept<'_>, prediction: &Prediction, library: &TemplateLibrary) -> f64 {
-    shape_ratio(percept, prediction, library) + color_ratio(&percept.object.appearance, &prediction.appearance)
+pub(crate) fn look_ratio(seen: Look<'_>, known: Look<'_>, library: &TemplateLibrary) -> f64 {
+    shape_ratio(seen, known, library) + color_ratio(seen.appearance, known.appearance)
 }
 
 /// Log ratio of template and parameters.
-pub(crate) fn shape_ratio(percept: &Percept<'_>, prediction: &Prediction, library: &TemplateLibrary) -> f64 {
+pub(crate) fn shape_ratio(percept: Look<'_>, prediction: Look<'_>, library: &TemplateLibrary) -> f64 {
     let (Some(seen), Some(known)) = (percept.parts.first(), prediction.parts.first()) else { return 0.0 };
     let templates = library.iter().count().max(1) as f64;
     if seen.template == known.template {
@@ -93,11 +121,16 @@ pub(crate) fn shape_ratio(percept: &Percept<'_>, prediction: &Prediction, librar
         let ratio = |spec: &ParameterSpec| {
             let find = |part: &'_ GroundedPart| part.parameters.iter().find(|p| p.name == spec.name).cloned();
             match (find(seen), find(known)) {
-                (Some(seen), Some(known)) => parameter_ratio(spec, &seen, &known, percept.object.truncated),
+                (Some(seen), Some(known)) => parameter_ratio(spec, &seen, &known, percept.truncated),
                 _ => 0.0,
             }
         };
         return (0.9 * templates).ln() + specs.iter().map(ratio).sum::<f64>();
+    }
+    // What cuts a thing off decides what its rest looks like: only what is larger than the thing tells against it.
+    if percept.truncated {
+        let fits = percept.body.extents().iter().zip(prediction.body.extents()).all(|(a, b)| *a < FITS_WITHIN * b);
+        return if fits { FRAGMENT } else { FRAGMENT * templates * 0.01 }.ln();
     }
     // Another template was chosen for the same thing: likelier among templates that share a noun and where the
     // outer sizes agree.

@@ -6,6 +6,7 @@
 //! its own by a weighted score over a threshold, is kept for comparison ([`paper`]).
 
 pub(crate) mod assignment;
+pub mod doubt;
 pub(crate) mod likelihood;
 pub(crate) mod paper;
 pub(crate) mod predict;
