@@ -256,7 +256,7 @@ impl Frame<'_, '_, '_> {
                 known.body.centre.distance(percept.body.centre) < reach
             })
         };
-        let may_be = |other: &&Match| found.alternatives.iter().any(|(id, _)| other.object == Some(*id));
+        let may_be = |other: &&Match| other.object.is_some_and(|id| found.possible.contains(&id));
         percept.object.truncated && matches.iter().filter(may_be).any(|other| beside(&other))
     }
 

@@ -35,6 +35,7 @@ pub(crate) fn assign(scores: &Scores, predictions: &[Prediction]) -> Vec<Match> 
                 object: chosen.map(|object| predictions[object].id),
                 probability: probability(chosen),
                 alternatives,
+                possible: scores.pairs[percept].iter().map(|(object, _)| predictions[*object].id).collect(),
             });
         }
     }

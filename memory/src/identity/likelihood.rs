@@ -27,6 +27,8 @@ const PLACE_GATE: f64 = 25.0;
 const FITS_WITHIN: f64 = 1.15;
 /// Likelihood ratio of a fragment that fits, whatever template was fitted to it.
 const FRAGMENT: f64 = 0.5;
+/// Systematic error of a length that all views from one side share, metres: many views do not average it out.
+const VIEW_BIAS_M: f64 = 0.003;
 /// What perception's own hint is worth, natural logarithm of 3.
 const HINT: f64 = 1.1;
 
@@ -43,7 +45,8 @@ pub(crate) struct Scores {
 pub(crate) fn scores(percepts: &[Percept<'_>], predictions: &[Prediction], library: &TemplateLibrary) -> Scores {
     let mut scores = Scores { pairs: Vec::with_capacity(percepts.len()), new: Vec::with_capacity(percepts.len()) };
     for percept in percepts {
-        let looks: Vec<f64> = predictions.iter().map(|known| look_ratio(Look::seen(percept), Look::known(known), library)).collect();
+        let looks: Vec<f64> =
+            predictions.iter().map(|known| look_ratio(Look::seen(percept), Look::known(known), library)).collect();
         let alike = looks.iter().map(|look| look.exp()).sum::<f64>() / (looks.len().max(1) as f64);
         let new = NEW.ln() + (1.0 - TWIN + TWIN * alike).ln();
         let pair = |(index, (prediction, look)): (usize, (&Prediction, &f64))| {
@@ -152,8 +155,8 @@ fn parameter_ratio(spec: &ParameterSpec, seen: &ParameterEstimate, known: &Param
     }
     let by_quotient = spec.unit == Unit::M && spec.min > 0.0 && seen.value > 0.0 && known.value > 0.0;
     let (offset, sigma, width) = if by_quotient {
-        let relative = |p: &ParameterEstimate| p.sigma / p.value;
-        let sigma = (relative(seen).powi(2) + relative(known).powi(2) + 0.04f64.powi(2)).sqrt();
+        let relative = |p: &ParameterEstimate| (p.sigma.hypot(VIEW_BIAS_M) / p.value).hypot(0.015);
+        let sigma = relative(seen).hypot(relative(known));
         ((seen.value / known.value).ln(), sigma, (spec.max / spec.min).ln())
     } else {
         let width = (spec.max - spec.min).max(1e-9);

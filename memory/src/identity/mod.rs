@@ -90,6 +90,8 @@ pub(crate) struct Match {
     pub(crate) probability: f64,
     /// Other objects that it may be, best first.
     pub(crate) alternatives: Vec<(ObjectId, f64)>,
+    /// All objects that it could be if it were the only thing in the frame.
+    pub(crate) possible: Vec<ObjectId>,
 }
 
 /// Gives every percept its best identity, in the order of the percepts.

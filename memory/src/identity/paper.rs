@@ -31,6 +31,7 @@ pub(crate) fn assign(percepts: &[Percept<'_>], predictions: &[Prediction], libra
             object: taken.map(|(id, _)| id),
             probability: taken.map_or(1.0 - best.map_or(0.0, |(_, score)| score), |(_, score)| score),
             alternatives: Vec::new(),
+            possible: Vec::new(),
         }
     };
     percepts.iter().enumerate().map(one).collect()
