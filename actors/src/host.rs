@@ -57,6 +57,8 @@ impl Core<Message> for HostPort {
             Message::Sense => Message::Moved(outside.embodiment.feedback()),
             Message::Command(command) => match outside.embodiment.command(command) {
                 Ok(feedback) => Message::Moved(feedback),
+                // Nobody is there to take another command: the episode ends.
+                Err(EmbodimentError::Failed { reason }) => Message::Broken { reason },
                 Err(error) => refusal(&error),
             },
             Message::Wait { seconds } => {

@@ -11,7 +11,8 @@ mod tests;
 pub use in_process::InProcessBus;
 pub use shared_memory::{BusError, BusLimits, SharedMemoryBus, SharedMemoryReader, SharedMemoryWriter, run_id};
 
-use bytes::Bytes;
+pub use bytes::Bytes;
+
 use std::sync::Arc;
 use thiserror::Error;
 

@@ -31,6 +31,12 @@ impl<T> Deref for Plane<T> {
     }
 }
 
+impl<T> AsRef<[T]> for Plane<T> {
+    fn as_ref(&self) -> &[T] {
+        self
+    }
+}
+
 impl<T> Clone for Plane<T> {
     fn clone(&self) -> Self {
         Plane(Arc::clone(&self.0))
