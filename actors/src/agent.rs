@@ -1,7 +1,7 @@
 //! The builder that puts an agent together, and one episode's run.
 
 use crate::{
-    episode::{Episode, WipeAt},
+    episode::{Episode, Until, WipeAt},
     executor::ExecutorActor,
     host::{HostPort, Outside},
     memory::MemoryActor,
@@ -61,6 +61,7 @@ pub struct AgentBuilder {
     grounder: GrounderConfig,
     journal: Arc<dyn Journal<Message>>,
     wipe_at: Option<WipeAt>,
+    until: Option<Until>,
     panic_at: Option<PanicAt>,
 }
 
@@ -88,6 +89,11 @@ impl AgentBuilder {
     /// Wipes memory at an event, as a fault for tests.
     pub fn wipe_at(mut self, event: Option<WipeAt>) -> Self {
         self.wipe_at = event;
+        self
+    }
+    /// Ends each run at an event; see [`crate::report::Ending::Until`].
+    pub fn until(mut self, until: Option<Until>) -> Self {
+        self.until = until;
         self
     }
     /// Makes an actor panic, as a fault for tests.
@@ -139,6 +145,7 @@ impl Agent {
             grounder: GrounderConfig::default(),
             journal: Arc::new(NoJournal),
             wipe_at: None,
+            until: None,
             panic_at: None,
         }
     }
@@ -158,8 +165,9 @@ impl Agent {
         interrupt: &Interrupt,
     ) -> Result<EpisodeRun, AgentError> {
         let camera = task.cameras.first().ok_or(AgentError::NoCamera)?.name.clone();
+        let began = clock.now().0;
         let outside = Arc::new(Mutex::new(Outside { embodiment, cameras, clock }));
-        let mut system = self.system(task, camera, outside).start().await?;
+        let mut system = self.system(task, camera, outside).starts_at(began).start().await?;
         system.send(EPISODE, Message::Begin);
         let result = tokio::select! {
             biased;
@@ -186,12 +194,12 @@ impl Agent {
         let robot = outside.lock().unwrap_or_else(std::sync::PoisonError::into_inner).embodiment.description().clone();
         let grounder = Arc::new(Grounder::new(Arc::clone(&parts.library), parts.grounder.clone()));
         let options = PlanOptions { on_unknown: parts.on_unknown, seed: parts.seed };
-        let (memory, wipe_at) = (Arc::clone(&parts.memory), parts.wipe_at.clone());
+        let (memory, wipe_at, until) = (Arc::clone(&parts.memory), parts.wipe_at.clone(), parts.until);
         let (planner, library) = (Arc::clone(&self.planner), Arc::clone(&parts.library));
         let (frames, seen, kept) = (Arc::clone(&bus), Arc::clone(&bus), bus);
         let (eyes, hands, plans) = (robot.clone(), robot.clone(), robot);
         SystemBuilder::new(1, Arc::clone(&parts.journal))
-            .actor(EPISODE, Box::new(move || Box::new(Episode::new(task.clone(), wipe_at.clone()))))
+            .actor(EPISODE, Box::new(move || Box::new(Episode::new(task.clone(), wipe_at.clone()).until(until))))
             .actor(
                 HOST,
                 Box::new(move || Box::new(HostPort::new(Arc::clone(&outside), camera.clone(), Arc::clone(&frames)))),
