@@ -9,7 +9,9 @@ mod shared_memory;
 mod tests;
 
 pub use in_process::InProcessBus;
-pub use shared_memory::{BusError, BusLimits, SharedMemoryBus, SharedMemoryReader, SharedMemoryWriter, run_id};
+pub use shared_memory::{
+    BusError, BusLimits, SharedMemoryBus, SharedMemoryReader, SharedMemoryWriter, leftovers, run_id,
+};
 
 pub use bytes::Bytes;
 

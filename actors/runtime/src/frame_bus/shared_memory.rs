@@ -14,7 +14,11 @@ pub use writer::SharedMemoryWriter;
 use super::{ByteFrame, FrameBus, FrameError, FrameReader, PublishError};
 use chunk::FrameTag;
 use iceoryx2::{
-    prelude::{LogLevel, Node, NodeBuilder, NodeName, ServiceName, SignalHandlingMode, ipc_threadsafe, set_log_level},
+    node::NodeView,
+    prelude::{
+        CallbackProgression, Config, LogLevel, Node, NodeBuilder, NodeName, NodeState, ServiceName, SignalHandlingMode,
+        ipc_threadsafe, set_log_level,
+    },
     service::port_factory::{event, publish_subscribe},
 };
 use std::{collections::hash_map::RandomState, hash::BuildHasher, sync::Arc};
@@ -101,6 +105,24 @@ pub enum BusError {
 pub fn run_id() -> String {
     // The standard library's hasher is seeded by the system.
     format!("{:x}-{:016x}", std::process::id(), RandomState::new().hash_one(std::process::id()))
+}
+
+/// Processes that died while they were on a bus and whose share of `/dev/shm` has not been given back. Whoever next
+/// creates, joins or leaves a bus does that.
+///
+/// # Errors
+/// The list cannot be read.
+pub fn leftovers() -> Result<Vec<u32>, BusError> {
+    set_log_level(LogLevel::Error);
+    let mut dead = Vec::new();
+    let listed = Node::<Service>::list(Config::global_config(), |state| {
+        if let NodeState::Dead(node) = state {
+            dead.extend(node.id().pid::<Service>().map(|pid| pid.value().unsigned_abs()));
+        }
+        CallbackProgression::Continue
+    });
+    listed.map_err(|e| BusError::Setup { name: "all".into(), action: "listed", reason: e.to_string() })?;
+    Ok(dead)
 }
 
 /// Both ends of a bus in one process.
