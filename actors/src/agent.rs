@@ -28,7 +28,7 @@ use acm_runtime::{
 };
 use std::{
     collections::BTreeMap,
-    sync::{Arc, Mutex},
+    sync::{Arc, Mutex, PoisonError, Weak},
     time::Duration,
 };
 use thiserror::Error;
@@ -167,13 +167,15 @@ impl Agent {
         let camera = task.cameras.first().ok_or(AgentError::NoCamera)?.name.clone();
         let began = clock.now().0;
         let outside = Arc::new(Mutex::new(Outside { embodiment, cameras, clock }));
+        let robot = Arc::clone(&outside);
         let mut system = self.system(task, camera, outside).starts_at(began).start().await?;
         system.send(EPISODE, Message::Begin);
         let result = tokio::select! {
             biased;
             result = system.result(WALL_LIMIT) => result,
             () = interrupt.0.notified() => {
-                system.send(HOST, Message::Interrupt);
+                // Not by message: the robot must stop even if its port has a queue or is ended before it comes to it.
+                tokio::task::block_in_place(|| robot.lock().unwrap_or_else(PoisonError::into_inner).embodiment.stop());
                 system.send(EPISODE, Message::Interrupt);
                 system.result(WALL_LIMIT).await
             }
@@ -191,10 +193,10 @@ impl Agent {
     fn system(&self, task: TaskSpec, camera: String, outside: Arc<Mutex<Outside>>) -> SystemBuilder<Message> {
         let parts = &self.parts;
         let bus: Arc<dyn FrameBus<RgbdFrame>> = Arc::new(InProcessBus::new(BUS_FRAMES));
-        let robot = outside.lock().unwrap_or_else(std::sync::PoisonError::into_inner).embodiment.description().clone();
+        let robot = outside.lock().unwrap_or_else(PoisonError::into_inner).embodiment.description().clone();
         let grounder = Arc::new(Grounder::new(Arc::clone(&parts.library), parts.grounder.clone()));
         let options = PlanOptions { on_unknown: parts.on_unknown, seed: parts.seed };
-        let (memory, wipe_at, until) = (Arc::clone(&parts.memory), parts.wipe_at.clone(), parts.until);
+        let (memory, wipe_at, until) = (Arc::downgrade(&parts.memory), parts.wipe_at.clone(), parts.until);
         let (planner, library) = (Arc::clone(&self.planner), Arc::clone(&parts.library));
         let (frames, seen, kept) = (Arc::clone(&bus), Arc::clone(&bus), bus);
         let (eyes, hands, plans) = (robot.clone(), robot.clone(), robot);
@@ -210,7 +212,7 @@ impl Agent {
                     Box::new(PerceptionActor::new(Arc::clone(&grounder), eyes.clone(), Arc::clone(&seen)))
                 }),
             )
-            .actor(MEMORY, Box::new(move || Box::new(MemoryActor::new(Arc::clone(&memory), Arc::clone(&kept)))))
+            .actor(MEMORY, Box::new(move || Box::new(MemoryActor::new(Weak::clone(&memory), Arc::clone(&kept)))))
             .actor(
                 PLANNER,
                 Box::new(move || {

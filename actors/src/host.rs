@@ -68,10 +68,6 @@ impl Core<Message> for HostPort {
                     Err(error) => Message::Broken { reason: error.to_string() },
                 }
             }
-            Message::Interrupt => {
-                outside.embodiment.stop();
-                return Ok(());
-            }
             other => return Err(CoreError(format!("{HOST} cannot handle {other:?}"))),
         };
         outbox.advance(outside.clock.now().0);

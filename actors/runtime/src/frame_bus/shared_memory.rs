@@ -21,13 +21,15 @@ use iceoryx2::{
     },
     service::port_factory::{event, publish_subscribe},
 };
-use std::{collections::hash_map::RandomState, hash::BuildHasher, sync::Arc};
+use std::{collections::hash_map::RandomState, hash::BuildHasher, sync::Arc, time::Duration};
 use thiserror::Error;
 
 /// Where the system keeps shared memory.
 const SHM_DIR: &str = "/dev/shm";
 /// Readers and the writer, and two more that may be dying while others start.
 const SPARE_NODES: usize = 3;
+/// How long another process is waited for that is cleaning up after a dead one.
+const CLEANUP_LIMIT: Duration = Duration::from_millis(500);
 
 type Service = ipc_threadsafe::Service;
 type Frames = publish_subscribe::PortFactory<Service, [u8], FrameTag>;
@@ -205,6 +207,12 @@ fn join(name: &str, limits: &BusLimits, create: bool) -> Result<Joined, BusError
         false => events.open().map_err(|e| setup(e.to_string())),
     }?;
     Ok(Joined { frames, events, node })
+}
+
+/// Gives back what dead processes left.
+fn clean_up(node: &Node<Service>) {
+    let state = node.blocking_cleanup_dead_nodes(CLEANUP_LIMIT);
+    tracing::debug!(?state, "cleaned up after dead processes");
 }
 
 /// Checks that `needed` bytes can be had. Memory of this kind is given page by page as it is first written, and a

@@ -4,7 +4,7 @@ use super::{
     super::{ByteFrame, FrameError, FrameLost, FrameReader},
     BusError, BusLimits, Events, Frames, Service,
     chunk::{FrameTag, cut},
-    join,
+    clean_up, join,
 };
 use bytes::Bytes;
 use iceoryx2::{
@@ -40,7 +40,7 @@ struct Ports {
     subscriber: Subscriber<Service, [u8], FrameTag>,
     // Kept open as long as the ports are.
     _services: (Frames, Events),
-    _node: Node<Service>,
+    node: Node<Service>,
 }
 
 impl fmt::Debug for SharedMemoryReader {
@@ -60,12 +60,12 @@ impl SharedMemoryReader {
         let subscriber =
             joined.frames.subscriber_builder().buffer_size(limits.frames).create().map_err(|e| setup(e.to_string()))?;
         let listener = joined.events.listener_builder().create().map_err(|e| setup(e.to_string()))?;
-        let (_services, _node) = ((joined.frames, joined.events), joined.node);
+        let (_services, node) = ((joined.frames, joined.events), joined.node);
         Ok(SharedMemoryReader {
             name: name.into(),
             limits,
             held: Arc::default(),
-            ports: Mutex::new(Ports { window: VecDeque::new(), subscriber, _services, _node }),
+            ports: Mutex::new(Ports { window: VecDeque::new(), subscriber, _services, node }),
             listener: Mutex::new(listener),
         })
     }
@@ -111,6 +111,13 @@ impl SharedMemoryReader {
             };
             ports.window.push_back((tag.number, cut(&tag, &payload).map(Arc::new)));
         }
+    }
+}
+
+impl Drop for SharedMemoryReader {
+    fn drop(&mut self) {
+        // A writer whose process was killed leaves all of the bus behind.
+        clean_up(&self.ports.get_mut().unwrap_or_else(PoisonError::into_inner).node);
     }
 }
 

@@ -4,7 +4,7 @@ use super::{
     super::{ByteFrame, MAX_FRAME_BYTES, MAX_PLANES, PublishError},
     BusError, BusLimits, Events, Frames, Service, check_room,
     chunk::{FrameTag, fill, payload_bytes},
-    join,
+    clean_up, join,
 };
 use iceoryx2::{
     port::{LoanError, notifier::Notifier, publisher::Publisher},
@@ -13,11 +13,7 @@ use iceoryx2::{
 use std::{
     fmt,
     sync::{Mutex, PoisonError},
-    time::Duration,
 };
-
-/// How long another process is waited for that is cleaning up after a dead one.
-const CLEANUP_LIMIT: Duration = Duration::from_millis(500);
 
 /// The end of a shared-memory bus that frames come from. Dropping it ends the bus; frames that readers hold stay valid.
 pub struct SharedMemoryWriter {
@@ -102,9 +98,7 @@ impl SharedMemoryWriter {
 
 impl Drop for SharedMemoryWriter {
     fn drop(&mut self) {
-        // A reader whose process was killed leaves its part of the bus behind.
-        let ports = self.ports.get_mut().unwrap_or_else(PoisonError::into_inner);
-        let state = ports.node.blocking_cleanup_dead_nodes(CLEANUP_LIMIT);
-        tracing::debug!(?state, "cleaned up after dead processes");
+        // A reader whose process was killed leaves its share of the bus behind.
+        clean_up(&self.ports.get_mut().unwrap_or_else(PoisonError::into_inner).node);
     }
 }
