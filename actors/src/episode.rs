@@ -368,3 +368,6 @@ impl Core<Message> for Episode {
         self.dispatch(message.body, outbox)
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -114,7 +114,7 @@ fn kill_simulators(seed: u64, rounds: u32) {
     let dir = tempfile::tempdir().unwrap();
     // Always the same address and memory: each round is the next run of the round before.
     let (socket, memory) = (dir.path().join("robot.sock"), dir.path().join("memory"));
-    let mut before = None;
+    let (mut before, mut hit) = (None, 0);
     for round in 0..rounds {
         let message = random.random_range(1..MESSAGES / 2);
         let mut host = HostProcess::simulator(SCENARIO, u64::from(round), &socket);
@@ -127,6 +127,7 @@ fn kill_simulators(seed: u64, rounds: u32) {
             let Ending::Broken { reason } = &result.report.ending else { panic!("{case}") };
             assert!(reason.contains("is lost: the other end closed the connection"), "{case}");
             assert!(!reason.contains('\n') && killer.since() < LIMIT, "{case}");
+            hit += 1;
         }
         host.process.child.wait().unwrap();
         drop(robot);
@@ -138,11 +139,12 @@ fn kill_simulators(seed: u64, rounds: u32) {
     }
     let host = HostProcess::simulator(SCENARIO, 0, &socket);
     probe(&host.address, &memory);
+    assert!(hit >= rounds / 2, "only {hit} of {rounds} simulators were still alive at their moment");
 }
 
 /// The memory folder opens, and holds every object and transition that memory had told of.
 fn holds_what_was_told(memory: &Path, journal: &MemoryJournal, case: &str) {
-    let told = journal.entries().into_iter().filter(|entry| ["updated", "kept"].contains(&entry.kind)).next_back();
+    let told = journal.entries().into_iter().rfind(|entry| ["updated", "kept"].contains(&entry.kind));
     let opened = AcmMemory::open(memory, acm_memory::default_library().unwrap().into()).unwrap();
     let Some(told) = told else { return };
     let body: serde_json::Value = serde_json::from_slice(&told.body).unwrap();
