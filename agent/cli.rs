@@ -1,6 +1,11 @@
 //! The command line and its exit codes.
 
-use crate::{demo, doctor, inject::Injection, perceive, run, scenario};
+use crate::{demo, doctor, inject::Injection, perceive, run, scenario, serve};
+use acm_actors::{
+    AgentError,
+    episode::Until,
+    remote::{Address, FrameMode},
+};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::{path::PathBuf, process::ExitCode, str::FromStr};
 
@@ -59,6 +64,9 @@ pub enum Command {
     /// List, check, describe or draw scenarios.
     #[command(subcommand)]
     Scenario(ScenarioCommand),
+    /// Run the simulator in a process of its own.
+    #[command(subcommand)]
+    Sim(SimCommand),
     /// Say what this machine has of what ACM needs.
     Doctor,
 }
@@ -115,7 +123,17 @@ impl From<OnUnknownArg> for acm_concept::task::OnUnknown {
 #[derive(Debug, Args)]
 pub struct RunArgs {
     /// A scenario's name (`acm scenario list`) or a scenario file; a file that exists goes first.
-    pub scenario: String,
+    #[arg(required_unless_present = "robot")]
+    pub scenario: Option<String>,
+    /// Run on the robot that a host at this address has (tcp://HOST:PORT or unix:///PATH); it sets the task.
+    #[arg(long, value_name = "URL", conflicts_with_all = ["scenario", "sensor"])]
+    pub robot: Option<Address>,
+    /// How frames come from that robot: auto, shared-memory, inline.
+    #[arg(long, value_name = "WAY", default_value = "auto", requires = "robot")]
+    pub frames: FrameMode,
+    /// End the run at an event: instruction.
+    #[arg(long, value_name = "EVENT")]
+    pub until: Option<Until>,
     /// A seed, or a range A..B that includes both ends.
     #[arg(long, default_value = "0")]
     pub seed: Seeds,
@@ -216,6 +234,46 @@ pub enum ScenarioCommand {
     },
 }
 
+/// The verbs of `acm sim`.
+#[derive(Debug, Subcommand)]
+pub enum SimCommand {
+    /// Host a scenario's world for `acm run --robot`, until it is interrupted. The world stays between agents.
+    Serve(ServeArgs),
+}
+
+/// Arguments of `acm sim serve`.
+#[derive(Debug, Args)]
+pub struct ServeArgs {
+    /// A scenario's name (`acm scenario list`) or a scenario file; a file that exists goes first.
+    pub scenario: String,
+    /// The world's seed.
+    #[arg(long, default_value_t = 0)]
+    pub seed: u64,
+    /// Where to listen: tcp://HOST:PORT (port 0 takes a free one) or unix:///PATH. There is no password.
+    #[arg(long, value_name = "URL", default_value = "tcp://127.0.0.1:7400")]
+    pub listen: Address,
+    /// Another sensor profile than the scenario's: none, d435, d435-hard.
+    #[arg(long, value_name = "PROFILE")]
+    pub sensor: Option<String>,
+    /// How frames go to the agent: auto, shared-memory, inline.
+    #[arg(long, value_name = "WAY", default_value = "auto")]
+    pub frames: FrameMode,
+    /// A fault of the world: slip@N.
+    #[arg(long, value_name = "FAULT")]
+    pub inject: Vec<Injection>,
+    /// Refuse every motion.
+    #[arg(long)]
+    pub no_motion: bool,
+}
+
+/// The exit code of an error: most are unusable input, a failed agent is a failure.
+pub fn exit_of_error(error: &anyhow::Error) -> Exit {
+    match error.downcast_ref::<AgentError>() {
+        Some(AgentError::System(_)) => Exit::Failed,
+        _ => Exit::Unusable,
+    }
+}
+
 /// Performs a command.
 pub fn run(cli: Cli) -> anyhow::Result<Exit> {
     match cli.command {
@@ -223,6 +281,7 @@ pub fn run(cli: Cli) -> anyhow::Result<Exit> {
         Command::Demo(args) => demo::run(&args),
         Command::Perceive(args) => perceive::run(&args),
         Command::Scenario(command) => scenario::run(&command),
+        Command::Sim(SimCommand::Serve(args)) => serve::run(&args),
         Command::Doctor => doctor::run(),
     }
 }

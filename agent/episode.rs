@@ -4,16 +4,19 @@ use crate::inject::{Faults, FrameTap};
 use acm_actors::{
     Agent,
     agent::Interrupt,
+    episode::Until,
+    host::Outside,
     message::Message,
+    remote::{HostVerdict, RemoteRobot},
     report::{Ending, EpisodeReport},
 };
 use acm_concept::{
     embodiment::{Command, Embodiment, EmbodimentError, Feedback, RobotDescription},
-    task::OnUnknown,
+    task::{OnUnknown, TaskSpec},
     template::TemplateLibrary,
 };
 use acm_planner::GiveUpCause;
-use acm_runtime::{journal::Journal, system::PanicAt};
+use acm_runtime::{envelope::Role, journal::Journal, system::PanicAt};
 use acm_sim::{OracleVerdict, Scenario, SharedRenderer, SimOptions, SimTimings, Simulation};
 use anyhow::Context;
 use serde::Serialize;
@@ -48,6 +51,8 @@ pub struct EpisodeConfig {
     pub frames: Option<FrameTap>,
     /// For tests: the actor of this name panics at its nth message.
     pub panic_at: Option<(String, u64)>,
+    /// The event at which the run ends.
+    pub until: Option<Until>,
 }
 
 /// What an episode came to, from both sides.
@@ -59,6 +64,8 @@ pub struct EpisodeResult {
     pub solved: bool,
     /// The agent says done and the judge says no.
     pub false_success: bool,
+    /// Whether anybody judged; without a judge the verdict says so and holds nothing.
+    pub judged: bool,
     /// The judge.
     pub verdict: OracleVerdict,
     /// The kind of failure to blame, if it was not solved.
@@ -78,7 +85,7 @@ pub struct EpisodeResult {
 /// Runs episodes: holds what they share.
 pub struct Runner {
     runtime: tokio::runtime::Runtime,
-    renderer: SharedRenderer,
+    renderer: Option<SharedRenderer>,
     library: Arc<TemplateLibrary>,
     interrupt: Interrupt,
 }
@@ -91,10 +98,15 @@ impl Runner {
 
     /// As [`Runner::new`], with another template library.
     pub fn with_library(library: TemplateLibrary) -> anyhow::Result<Runner> {
+        let renderer = Arc::new(Mutex::new(acm_render::Renderer::new()?));
+        Ok(Runner { renderer: Some(renderer), ..Runner::without_renderer(library)? })
+    }
+
+    /// As [`Runner::with_library`], for worlds that have eyes of their own.
+    pub fn without_renderer(library: TemplateLibrary) -> anyhow::Result<Runner> {
         // Ports block while they render or step the world, so one worker more than one.
         let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?;
-        let renderer = Arc::new(Mutex::new(acm_render::Renderer::new()?));
-        Ok(Runner { runtime, renderer, library: Arc::new(library), interrupt: Interrupt::default() })
+        Ok(Runner { runtime, renderer: None, library: Arc::new(library), interrupt: Interrupt::default() })
     }
 
     /// Ends the running episode when the process is interrupted from the keyboard.
@@ -115,11 +127,16 @@ impl Runner {
     }
     /// What the renderer runs on.
     pub fn adapter(&self) -> String {
-        self.renderer.lock().unwrap_or_else(PoisonError::into_inner).adapter().to_string()
+        let adapter =
+            |renderer: &SharedRenderer| renderer.lock().unwrap_or_else(PoisonError::into_inner).adapter().to_string();
+        self.renderer.as_ref().map_or_else(|| "nothing".into(), adapter)
     }
     /// The renderer, which takes a second to start and is shared.
-    pub fn renderer(&self) -> SharedRenderer {
-        Arc::clone(&self.renderer)
+    ///
+    /// # Errors
+    /// The runner was made without one.
+    pub fn renderer(&self) -> anyhow::Result<SharedRenderer> {
+        self.renderer.clone().context("this runner has no renderer")
     }
 
     /// Runs one episode.
@@ -138,54 +155,120 @@ impl Runner {
             camera_size: None,
         };
         let started = now();
-        let simulation = Simulation::new(scenario, &options, self.renderer()).context("the world cannot be built")?;
+        let simulation = Simulation::new(scenario, &options, self.renderer()?).context("the world cannot be built")?;
         let world = simulation.world_digest();
         let built_s = started.elapsed().as_secs_f64();
+        let outside =
+            Outside { embodiment: simulation.embodiment(), cameras: simulation.camera(), clock: simulation.clock() };
+        let mut lived = self.live(simulation.task(), outside, seed, config, journal)?;
+        split_host_time(&mut lived.spent_s, &simulation.timings());
+        lived.spent_s.insert("world-building".into(), built_s);
+        let judged = !matches!(lived.report.ending, Ending::Until { .. });
+        Ok(lived.result(seed, world, judged.then(|| simulation.verdict()), started))
+    }
+
+    /// Runs one episode on a robot in another process. The seed is that of the agent's own draws. A host that is lost
+    /// on the way ends the episode; then there is no verdict.
+    pub fn run_remote(
+        &self,
+        robot: &RemoteRobot,
+        seed: u64,
+        config: &EpisodeConfig,
+        journal: Arc<dyn Journal<Message>>,
+    ) -> anyhow::Result<EpisodeResult> {
+        let started = now();
+        let outside = Outside { embodiment: robot.embodiment(), cameras: robot.camera(), clock: robot.clock() };
+        let mut lived = self.live(robot.task().clone(), outside, seed, config, journal)?;
+        let verdict = match &lived.report.ending {
+            // Nobody has done anything yet that could be judged, and a lost host judges nothing.
+            Ending::Until { .. } | Ending::Broken { .. } => Ok(None),
+            _ => robot.done(&lived.report),
+        };
+        let verdict = verdict.unwrap_or_else(|error| {
+            lived.report.ending = Ending::Broken { reason: error.to_string() };
+            None
+        });
+        Ok(lived.result(seed, String::new(), verdict.map(verdict_of), started))
+    }
+
+    /// Lets an agent live in a world.
+    fn live(
+        &self,
+        mut task: TaskSpec,
+        outside: Outside,
+        seed: u64,
+        config: &EpisodeConfig,
+        journal: Arc<dyn Journal<Message>>,
+    ) -> anyhow::Result<Lived> {
         let memory = acm_baselines::by_name(&config.method, Arc::clone(&self.library), config.memory.as_deref())?;
+        let panic_at = config.panic_at.as_ref().or(config.faults.panic_at.as_ref());
         let agent = Agent::builder(Arc::clone(&self.library), memory)
             .on_unknown(config.on_unknown)
             .seed(seed)
             .wipe_at(config.faults.wipe_at.clone())
+            .until(config.until)
             .journal(journal)
-            .panic_at(config.panic_at.as_ref().and_then(|(role, message)| fault_of(role, *message)))
+            .panic_at(panic_at.and_then(|(name, message)| role(name).map(|role| PanicAt { role, message: *message })))
             .build()?;
-        let mut task = simulation.task();
         if let Some(instruction) = &config.instruction {
             task.instruction.clone_from(instruction);
         }
         let commands = Arc::new(AtomicU64::new(0));
-        let robot = Box::new(Counted { robot: simulation.embodiment(), commands: Arc::clone(&commands) });
-        let mut cameras = config.faults.cameras(simulation.camera());
+        let robot =
+            Box::new(Counted { robot: outside.embodiment, commands: Arc::clone(&commands), motion: !config.no_motion });
+        let mut cameras = config.faults.cameras(outside.cameras);
         if let Some(tap) = &config.frames {
             cameras = tap.cameras(cameras);
         }
-        let run = self.runtime.block_on(agent.run(task, robot, cameras, simulation.clock(), &self.interrupt))?;
-        let verdict = simulation.verdict();
-        let done = run.report.ending == Ending::Done;
-        let solved = done && verdict.strict;
-        let mut spent_s: BTreeMap<String, f64> =
-            run.spent.iter().map(|(role, time)| (role.to_string(), time.as_secs_f64())).collect();
-        split_host_time(&mut spent_s, &simulation.timings());
-        spent_s.insert("world-building".into(), built_s);
-        Ok(EpisodeResult {
-            seed,
-            solved,
-            false_success: done && !verdict.strict,
-            cause: if solved { None } else { Some(blame(&run.report, &verdict)) },
-            verdict,
+        let run = self.runtime.block_on(agent.run(task, robot, cameras, outside.clock, &self.interrupt))?;
+        Ok(Lived {
             report: run.report,
-            world,
-            motion_commands: commands.load(Ordering::Relaxed),
-            wall_s: started.elapsed().as_secs_f64(),
-            spent_s,
+            spent_s: run.spent.iter().map(|(role, time)| (role.to_string(), time.as_secs_f64())).collect(),
+            commands: commands.load(Ordering::Relaxed),
         })
     }
 }
 
-fn fault_of(role: &str, message: u64) -> Option<PanicAt> {
-    use acm_actors::message::{EXECUTOR, HOST, MEMORY, PERCEPTION, PLANNER, VERIFIER};
-    let roles = [EXECUTOR, HOST, MEMORY, PERCEPTION, PLANNER, VERIFIER];
-    roles.into_iter().find(|known| known.0 == role).map(|role| PanicAt { role, message })
+/// An episode before it is judged.
+struct Lived {
+    report: EpisodeReport,
+    spent_s: BTreeMap<String, f64>,
+    commands: u64,
+}
+
+impl Lived {
+    fn result(self, seed: u64, world: String, verdict: Option<OracleVerdict>, started: Instant) -> EpisodeResult {
+        let judged = verdict.is_some();
+        let verdict = verdict.unwrap_or_else(|| verdict_of(HostVerdict::default()));
+        let done = self.report.ending == Ending::Done;
+        let solved = done && verdict.strict;
+        EpisodeResult {
+            seed,
+            solved,
+            false_success: done && judged && !verdict.strict,
+            cause: if solved || !judged { None } else { Some(blame(&self.report, &verdict)) },
+            judged,
+            verdict,
+            report: self.report,
+            world,
+            motion_commands: self.commands,
+            wall_s: started.elapsed().as_secs_f64(),
+            spent_s: self.spent_s,
+        }
+    }
+}
+
+/// A host's verdict as one of ours.
+fn verdict_of(verdict: HostVerdict) -> OracleVerdict {
+    let HostVerdict { strict, faithful, stages, violations, explanation } = verdict;
+    OracleVerdict { strict, faithful, stages, violations, explanation }
+}
+
+/// The actor of this name.
+pub(crate) fn role(name: &str) -> Option<Role> {
+    use acm_actors::message::{EPISODE, EXECUTOR, HOST, MEMORY, PERCEPTION, PLANNER, VERIFIER};
+    let roles = [EPISODE, EXECUTOR, HOST, MEMORY, PERCEPTION, PLANNER, VERIFIER];
+    roles.into_iter().find(|known| known.0 == name)
 }
 
 /// The host's time is the world's: physics, rendering and sensor noise are what it consists of.
@@ -208,10 +291,11 @@ fn blame(report: &EpisodeReport, verdict: &OracleVerdict) -> GiveUpCause {
     }
 }
 
-/// Counts the motion commands that reach the robot.
+/// Counts the motion commands that reach the robot, or lets none through.
 struct Counted {
     robot: Box<dyn Embodiment>,
     commands: Arc<AtomicU64>,
+    motion: bool,
 }
 
 impl Embodiment for Counted {
@@ -223,7 +307,10 @@ impl Embodiment for Counted {
     }
     fn command(&mut self, command: &Command) -> Result<Feedback, EmbodimentError> {
         self.commands.fetch_add(1, Ordering::Relaxed);
-        self.robot.command(command)
+        match self.motion {
+            true => self.robot.command(command),
+            false => Err(EmbodimentError::MotionDisabled),
+        }
     }
     fn stop(&mut self) {
         self.robot.stop();

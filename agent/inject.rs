@@ -18,6 +18,13 @@ pub enum Injection {
     WipeMemory(WipeAt),
     /// What the hand carries is taken out of it unseen, during its nth carry from 1.
     Slip(u32),
+    /// An actor fails when it is about to handle its nth message from 1. Left out of the help: it is for tests.
+    Panic {
+        /// The actor's role.
+        role: String,
+        /// Which message.
+        message: u64,
+    },
 }
 
 impl FromStr for Injection {
@@ -34,6 +41,14 @@ impl FromStr for Injection {
                 Ok(carry) if carry > 0 => Ok(Injection::Slip(carry)),
                 _ => Err(format!("`{carry}` is no number of a carry: write slip@1 for the first")),
             },
+            Some(("panic", at)) => {
+                match at.split_once(':').map(|(role, message)| (role.to_string(), message.parse())) {
+                    Some((role, Ok(message))) if message > 0 && crate::episode::role(&role).is_some() => {
+                        Ok(Injection::Panic { role, message })
+                    }
+                    _ => Err(format!("`{at}` is no message of an actor: write panic@perception:3")),
+                }
+            }
             _ => Err(format!("`{text}` is no fault: black-frames, freeze-frames, wipe-memory@EVENT or slip@N")),
         }
     }
@@ -50,6 +65,8 @@ pub struct Faults {
     pub wipe_at: Option<WipeAt>,
     /// See [`Injection::Slip`].
     pub slip_at: Option<u32>,
+    /// See [`Injection::Panic`].
+    pub panic_at: Option<(String, u64)>,
 }
 
 impl Faults {
@@ -62,6 +79,7 @@ impl Faults {
                 Injection::FreezeFrames => faults.freeze_frames = true,
                 Injection::WipeMemory(event) => faults.wipe_at = Some(event.clone()),
                 Injection::Slip(carry) => faults.slip_at = Some(*carry),
+                Injection::Panic { role, message } => faults.panic_at = Some((role.clone(), *message)),
             }
         }
         faults
@@ -129,13 +147,13 @@ impl CameraSource for FaultyCamera {
     fn capture(&mut self, camera: &str) -> Result<RgbdFrame, CameraError> {
         let mut frame = self.cameras.capture(camera)?;
         if self.black {
-            frame.color = Arc::from(vec![0; frame.color.len()]);
-            frame.depth = Arc::from(vec![0.0; frame.depth.len()]);
+            frame.color = vec![0; frame.color.len()].into();
+            frame.depth = vec![0.0; frame.depth.len()].into();
             return Ok(frame);
         }
         let first = self.first.get_or_insert_with(|| frame.clone());
-        frame.color = Arc::clone(&first.color);
-        frame.depth = Arc::clone(&first.depth);
+        frame.color = first.color.clone();
+        frame.depth = first.depth.clone();
         Ok(frame)
     }
 }
@@ -148,7 +166,10 @@ mod tests {
     fn faults_are_read_and_mistakes_named() {
         assert_eq!("slip@2".parse(), Ok(Injection::Slip(2)));
         assert_eq!("wipe-memory@instruction".parse(), Ok(Injection::WipeMemory(WipeAt::Instruction)));
-        for bad in ["slip@0", "slip", "wipe-memory@noon", "white-frames"] {
+        assert_eq!("panic@memory:4".parse(), Ok(Injection::Panic { role: "memory".into(), message: 4 }));
+        for bad in
+            ["panic@memory", "panic@butler:1", "panic@memory:0", "slip@0", "slip", "wipe-memory@noon", "white-frames"]
+        {
             assert!(bad.parse::<Injection>().is_err(), "{bad}");
         }
     }

@@ -5,6 +5,8 @@
 //! | [`cli`] | the command line and its exit codes |
 //! | [`episode`] | one episode: simulator, agent, judge |
 //! | [`run`] | `acm run`: one episode told, or a range of seeds counted |
+//! | [`remote`] | `acm run --robot`: an episode on a robot in another process |
+//! | [`serve`] | `acm sim serve`: the simulator as such a robot |
 //! | [`inject`] | faults that can be put between the agent and its world |
 //! | [`narrate`] | the story of an episode, told from its messages |
 //! | [`demo`] | `acm demo`: the first minute |
@@ -19,6 +21,8 @@ pub mod episode;
 pub mod inject;
 pub mod narrate;
 pub mod perceive;
+pub mod remote;
 pub mod run;
 pub mod scenario;
+pub mod serve;
 pub mod statistics;

@@ -21,7 +21,7 @@ fn main() -> ExitCode {
         Err(error) if is_broken_pipe(&error) => Exit::Success.into(),
         Err(error) => {
             eprintln!("acm: {}", one_line(&format!("{error:#}")));
-            Exit::Unusable.into()
+            acm::cli::exit_of_error(&error).into()
         }
     }
 }

@@ -5,9 +5,11 @@ use crate::{
     episode::{EpisodeConfig, EpisodeResult, Runner},
     inject::Faults,
     narrate::Narrator,
+    remote,
     statistics::{median_and, wilson95},
 };
-use acm_actors::report::Ending;
+use acm_actors::{episode::Until, report::Ending};
+use acm_concept::template::TemplateLibrary;
 use acm_runtime::journal::NoJournal;
 use acm_sim::Scenario;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -20,7 +22,19 @@ use std::{
 
 /// Runs `acm run`.
 pub fn run(args: &RunArgs) -> anyhow::Result<Exit> {
-    let scenario = Scenario::open(&args.scenario)?;
+    let Some(scenario) = &args.scenario else { return remote::run(args) };
+    let scenario = Scenario::open(scenario)?;
+    let (config, library) = prepare(args)?;
+    let runner = Runner::with_library(library)?;
+    runner.end_on_ctrl_c();
+    match args.seed.range {
+        false => one(&runner, &scenario, args, &config),
+        true => many(&runner, &scenario, args, &config),
+    }
+}
+
+/// Reads what a run needs beside its world.
+pub(crate) fn prepare(args: &RunArgs) -> anyhow::Result<(EpisodeConfig, TemplateLibrary)> {
     let config = EpisodeConfig {
         method: args.method.clone(),
         on_unknown: args.on_unknown.into(),
@@ -29,8 +43,8 @@ pub fn run(args: &RunArgs) -> anyhow::Result<Exit> {
         faults: Faults::new(&args.inject),
         no_motion: args.no_motion,
         sensor: args.sensor.clone(),
-        frames: None,
-        panic_at: None,
+        until: args.until,
+        ..EpisodeConfig::default()
     };
     let library = match &args.library {
         Some(dir) => acm_memory::library_from_dir(dir)?,
@@ -38,12 +52,7 @@ pub fn run(args: &RunArgs) -> anyhow::Result<Exit> {
     };
     // A misspelt method or a memory that cannot be opened must not cost the start of the renderer.
     drop(acm_baselines::by_name(&config.method, Arc::new(library.clone()), config.memory.as_deref())?);
-    let runner = Runner::with_library(library)?;
-    runner.end_on_ctrl_c();
-    match args.seed.range {
-        false => one(&runner, &scenario, args, &config),
-        true => many(&runner, &scenario, args, &config),
-    }
+    Ok((config, library))
 }
 
 fn one(runner: &Runner, scenario: &Scenario, args: &RunArgs, config: &EpisodeConfig) -> anyhow::Result<Exit> {
@@ -54,15 +63,20 @@ fn one(runner: &Runner, scenario: &Scenario, args: &RunArgs, config: &EpisodeCon
         let narrator = Arc::new(Narrator::new(Box::new(std::io::stdout())));
         runner.run(scenario, args.seed.first, config, narrator)?
     };
+    tell_result(&Source::of(scenario, args), args, &result)?;
+    Ok(exit_of(&result))
+}
+
+/// Prints what one episode came to.
+pub(crate) fn tell_result(source: &Source<'_>, args: &RunArgs, result: &EpisodeResult) -> anyhow::Result<()> {
     if args.json {
-        let runs = Runs::new(scenario, args, std::slice::from_ref(&result));
+        let runs = Runs::new(source, args, std::slice::from_ref(result));
         serde_json::to_writer_pretty(std::io::stdout().lock(), &runs)?;
         println!();
-    } else {
-        print_judgement(&result)?;
-        print_times(std::slice::from_ref(&result))?;
+        return Ok(());
     }
-    Ok(exit_of(&result))
+    print_judgement(result)?;
+    print_times(std::slice::from_ref(result))
 }
 
 fn many(runner: &Runner, scenario: &Scenario, args: &RunArgs, config: &EpisodeConfig) -> anyhow::Result<Exit> {
@@ -81,7 +95,8 @@ fn many(runner: &Runner, scenario: &Scenario, args: &RunArgs, config: &EpisodeCo
         }
     }
     bar.finish_and_clear();
-    let runs = Runs::new(scenario, args, &results);
+    let source = Source::of(scenario, args);
+    let runs = Runs::new(&source, args, &results);
     if args.json {
         serde_json::to_writer_pretty(std::io::stdout().lock(), &runs)?;
         println!();
@@ -117,6 +132,8 @@ fn progress(count: u64, hidden: bool) -> ProgressBar {
 pub fn exit_of(result: &EpisodeResult) -> Exit {
     match &result.report.ending {
         _ if result.solved => Exit::Success,
+        Ending::Done if !result.judged => Exit::Success,
+        Ending::Until { .. } => Exit::Success,
         Ending::GaveUp { .. } => Exit::GaveUp,
         Ending::NotUnderstood { .. } => Exit::Unusable,
         Ending::Interrupted => Exit::Interrupted,
@@ -142,6 +159,9 @@ pub fn ending_words(ending: &Ending) -> String {
         Ending::Done => "done".into(),
         Ending::GaveUp { unknown, .. } => format!("gave up: {unknown}"),
         Ending::NotUnderstood { reason } => format!("not understood: {reason}"),
+        Ending::Until { event: Until::Instruction } => {
+            "the instruction would be given now, and the run ends here as asked".into()
+        }
         Ending::Interrupted => "interrupted".into(),
         Ending::Broken { reason } => format!("broken: {reason}"),
     }
@@ -150,6 +170,7 @@ pub fn ending_words(ending: &Ending) -> String {
 fn line(result: &EpisodeResult) -> String {
     let word = match (result.solved, result.cause) {
         (true, _) => "solved".to_string(),
+        _ if matches!(result.report.ending, Ending::Until { .. }) => "ended as asked".to_string(),
         (false, Some(cause)) => format!("NOT SOLVED ({})", cause.word()),
         (false, None) => "NOT SOLVED".to_string(),
     };
@@ -173,6 +194,10 @@ fn line(result: &EpisodeResult) -> String {
 fn print_judgement(result: &EpisodeResult) -> anyhow::Result<()> {
     let mut out = std::io::stdout().lock();
     let verdict = &result.verdict;
+    if !result.judged {
+        writeln!(out, "judge     none has judged this run")?;
+        return Ok(());
+    }
     let word = |holds: bool| if holds { "success" } else { "no success" };
     writeln!(out, "judge     strict: {}; {}", word(verdict.strict), verdict.explanation)?;
     if let Some(faithful) = verdict.faithful {
@@ -239,6 +264,20 @@ fn print_times(results: &[EpisodeResult]) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// Where episodes took place.
+pub(crate) struct Source<'a> {
+    /// The scenario, or the address of a robot.
+    pub name: &'a str,
+    /// The sensor profile.
+    pub sensor: &'a str,
+}
+
+impl<'a> Source<'a> {
+    fn of(scenario: &'a Scenario, args: &'a RunArgs) -> Source<'a> {
+        Source { name: scenario.name(), sensor: args.sensor.as_deref().unwrap_or(scenario.sensor()) }
+    }
+}
+
 /// The results of a range, as `--json` prints them.
 #[derive(Serialize)]
 struct Runs<'a> {
@@ -246,7 +285,7 @@ struct Runs<'a> {
     scenario: &'a str,
     method: &'a str,
     on_unknown: &'static str,
-    sensor: String,
+    sensor: &'a str,
     seeds: [u64; 2],
     solved: usize,
     faithful: usize,
@@ -258,7 +297,7 @@ struct Runs<'a> {
 }
 
 impl<'a> Runs<'a> {
-    fn new(scenario: &'a Scenario, args: &'a RunArgs, episodes: &'a [EpisodeResult]) -> Runs<'a> {
+    fn new(source: &Source<'a>, args: &'a RunArgs, episodes: &'a [EpisodeResult]) -> Runs<'a> {
         let count = |test: fn(&EpisodeResult) -> bool| episodes.iter().filter(|e| test(e)).count();
         let mut causes = BTreeMap::new();
         for cause in episodes.iter().filter_map(|e| e.cause) {
@@ -266,13 +305,13 @@ impl<'a> Runs<'a> {
         }
         Runs {
             schema: "acm.run/1",
-            scenario: scenario.name(),
+            scenario: source.name,
             method: &args.method,
             on_unknown: match args.on_unknown {
                 crate::cli::OnUnknownArg::Abstain => "abstain",
                 crate::cli::OnUnknownArg::Guess => "guess",
             },
-            sensor: args.sensor.clone().unwrap_or_else(|| scenario.sensor().into()),
+            sensor: source.sensor,
             seeds: [args.seed.first, args.seed.last],
             solved: count(|e| e.solved),
             faithful: count(|e| e.verdict.faithful == Some(true)),

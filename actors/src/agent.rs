@@ -1,7 +1,7 @@
 //! The builder that puts an agent together, and one episode's run.
 
 use crate::{
-    episode::{Episode, WipeAt},
+    episode::{Episode, Until, WipeAt},
     executor::ExecutorActor,
     host::{HostPort, Outside},
     memory::MemoryActor,
@@ -28,7 +28,7 @@ use acm_runtime::{
 };
 use std::{
     collections::BTreeMap,
-    sync::{Arc, Mutex},
+    sync::{Arc, Mutex, PoisonError, Weak},
     time::Duration,
 };
 use thiserror::Error;
@@ -61,6 +61,7 @@ pub struct AgentBuilder {
     grounder: GrounderConfig,
     journal: Arc<dyn Journal<Message>>,
     wipe_at: Option<WipeAt>,
+    until: Option<Until>,
     panic_at: Option<PanicAt>,
 }
 
@@ -88,6 +89,11 @@ impl AgentBuilder {
     /// Wipes memory at an event, as a fault for tests.
     pub fn wipe_at(mut self, event: Option<WipeAt>) -> Self {
         self.wipe_at = event;
+        self
+    }
+    /// Ends each run at an event; see [`crate::report::Ending::Until`].
+    pub fn until(mut self, until: Option<Until>) -> Self {
+        self.until = until;
         self
     }
     /// Makes an actor panic, as a fault for tests.
@@ -139,6 +145,7 @@ impl Agent {
             grounder: GrounderConfig::default(),
             journal: Arc::new(NoJournal),
             wipe_at: None,
+            until: None,
             panic_at: None,
         }
     }
@@ -158,14 +165,17 @@ impl Agent {
         interrupt: &Interrupt,
     ) -> Result<EpisodeRun, AgentError> {
         let camera = task.cameras.first().ok_or(AgentError::NoCamera)?.name.clone();
+        let began = clock.now().0;
         let outside = Arc::new(Mutex::new(Outside { embodiment, cameras, clock }));
-        let mut system = self.system(task, camera, outside).start().await?;
+        let robot = Arc::clone(&outside);
+        let mut system = self.system(task, camera, outside).starts_at(began).start().await?;
         system.send(EPISODE, Message::Begin);
         let result = tokio::select! {
             biased;
             result = system.result(WALL_LIMIT) => result,
             () = interrupt.0.notified() => {
-                system.send(HOST, Message::Interrupt);
+                // Not by message: the robot must stop even if its port has a queue or is ended before it comes to it.
+                tokio::task::block_in_place(|| robot.lock().unwrap_or_else(PoisonError::into_inner).embodiment.stop());
                 system.send(EPISODE, Message::Interrupt);
                 system.result(WALL_LIMIT).await
             }
@@ -183,15 +193,15 @@ impl Agent {
     fn system(&self, task: TaskSpec, camera: String, outside: Arc<Mutex<Outside>>) -> SystemBuilder<Message> {
         let parts = &self.parts;
         let bus: Arc<dyn FrameBus<RgbdFrame>> = Arc::new(InProcessBus::new(BUS_FRAMES));
-        let robot = outside.lock().unwrap_or_else(std::sync::PoisonError::into_inner).embodiment.description().clone();
+        let robot = outside.lock().unwrap_or_else(PoisonError::into_inner).embodiment.description().clone();
         let grounder = Arc::new(Grounder::new(Arc::clone(&parts.library), parts.grounder.clone()));
         let options = PlanOptions { on_unknown: parts.on_unknown, seed: parts.seed };
-        let (memory, wipe_at) = (Arc::clone(&parts.memory), parts.wipe_at.clone());
+        let (memory, wipe_at, until) = (Arc::downgrade(&parts.memory), parts.wipe_at.clone(), parts.until);
         let (planner, library) = (Arc::clone(&self.planner), Arc::clone(&parts.library));
         let (frames, seen, kept) = (Arc::clone(&bus), Arc::clone(&bus), bus);
         let (eyes, hands, plans) = (robot.clone(), robot.clone(), robot);
         SystemBuilder::new(1, Arc::clone(&parts.journal))
-            .actor(EPISODE, Box::new(move || Box::new(Episode::new(task.clone(), wipe_at.clone()))))
+            .actor(EPISODE, Box::new(move || Box::new(Episode::new(task.clone(), wipe_at.clone()).until(until))))
             .actor(
                 HOST,
                 Box::new(move || Box::new(HostPort::new(Arc::clone(&outside), camera.clone(), Arc::clone(&frames)))),
@@ -202,7 +212,7 @@ impl Agent {
                     Box::new(PerceptionActor::new(Arc::clone(&grounder), eyes.clone(), Arc::clone(&seen)))
                 }),
             )
-            .actor(MEMORY, Box::new(move || Box::new(MemoryActor::new(Arc::clone(&memory), Arc::clone(&kept)))))
+            .actor(MEMORY, Box::new(move || Box::new(MemoryActor::new(Weak::clone(&memory), Arc::clone(&kept)))))
             .actor(
                 PLANNER,
                 Box::new(move || {

@@ -20,7 +20,7 @@ use acm_runtime::{
     envelope::{Envelope, OUTSIDE},
 };
 use state::{Doing, Pending};
-pub use state::{ParseEventError, WipeAt};
+pub use state::{ParseEventError, Until, WipeAt};
 
 /// How many frames may be taken to decide one verification.
 const MAX_VERIFY_LOOKS: u32 = 2;
@@ -35,6 +35,7 @@ const MAX_RESTARTS: u32 = 4;
 pub struct Episode {
     task_spec: TaskSpec,
     wipe_at: Option<WipeAt>,
+    until: Option<Until>,
     doing: Doing,
     task: Option<std::sync::Arc<acm_planner::Task>>,
     view: Option<View>,
@@ -56,6 +57,7 @@ impl Episode {
             deadline: Time::from_seconds(task_spec.instruction_at_s + task_spec.budgets.seconds),
             task_spec,
             wipe_at,
+            until: None,
             doing: Doing::Starting,
             task: None,
             view: None,
@@ -73,6 +75,12 @@ impl Episode {
                 restarts: 0,
             },
         }
+    }
+
+    /// Ends the run at an event instead of going on.
+    pub fn until(mut self, until: Option<Until>) -> Episode {
+        self.until = until;
+        self
     }
 
     fn dispatch(&mut self, message: Message, out: &mut Outbox<Message>) -> Result<(), CoreError> {
@@ -135,7 +143,7 @@ impl Episode {
     fn updated(&mut self, feedback: Feedback, view: View, _: &Grounding, out: &mut Outbox<Message>) {
         self.report.frames_perceived += 1;
         (self.feedback, self.view) = (Some(feedback), Some(view));
-        if Time(out.time_ns()) < Time::from_seconds(self.task_spec.instruction_at_s) {
+        if !self.instruction_is_due(out) {
             return self.send(Doing::Waiting, HOST, Message::Wait { seconds: WATCH_PAUSE_S }, out);
         }
         if self.task.is_none() {
@@ -149,7 +157,14 @@ impl Episode {
 
     // --- understanding ------------------------------------------------------------------------------------------
 
+    fn instruction_is_due(&self, out: &Outbox<Message>) -> bool {
+        Time(out.time_ns()) >= Time::from_seconds(self.task_spec.instruction_at_s)
+    }
+
     fn parse(&mut self, out: &mut Outbox<Message>) {
+        if let Some(event @ Until::Instruction) = self.until {
+            return self.end(Ending::Until { event }, out);
+        }
         let instruction = self.task_spec.instruction.clone();
         self.send(Doing::Parsing, PLANNER, Message::Parse { instruction }, out);
     }
@@ -276,7 +291,11 @@ impl Episode {
     fn kept(&mut self, transition: Option<TransitionId>, view: View, out: &mut Outbox<Message>) {
         self.view = Some(view);
         match self.doing {
-            Doing::Beginning if self.task_spec.instruction_at_s <= Time(out.time_ns()).seconds() => self.parse(out),
+            Doing::Beginning if self.instruction_is_due(out) => {
+                // Who joins a world after that moment is told now, and has the whole budget from now on.
+                self.deadline = self.deadline.max(Time(out.time_ns()) + self.task_spec.budgets.seconds);
+                self.parse(out);
+            }
             Doing::Beginning => self.look("watching before the instruction", out),
             Doing::Instructing if self.wipe_is_due(&WipeAt::Instruction) => self.wipe(out),
             Doing::Instructing => self.look("the instruction was given", out),
@@ -334,6 +353,7 @@ impl Episode {
             return self.skill_ended(Box::new(report), out);
         }
         match (&self.doing, &self.task) {
+            _ if !self.instruction_is_due(out) => self.look("an actor was restarted", out),
             (Doing::Beginning | Doing::Parsing | Doing::Instructing, _) | (_, None) => self.parse(out),
             _ => self.look("an actor was restarted", out),
         }
@@ -348,3 +368,6 @@ impl Core<Message> for Episode {
         self.dispatch(message.body, outbox)
     }
 }
+
+#[cfg(test)]
+mod tests;

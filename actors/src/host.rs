@@ -39,8 +39,10 @@ impl HostPort {
         match outside.cameras.capture(&self.camera) {
             Ok(frame) => {
                 let header = frame.header.clone();
-                self.bus.publish(header.id.0, Arc::new(frame));
-                Message::Frame { header, feedback: outside.embodiment.feedback() }
+                match self.bus.publish(header.id.0, Arc::new(frame)) {
+                    Ok(()) => Message::Frame { header, feedback: outside.embodiment.feedback() },
+                    Err(error) => Message::Broken { reason: error.to_string() },
+                }
             }
             Err(error) => Message::Broken { reason: error.to_string() },
         }
@@ -55,6 +57,8 @@ impl Core<Message> for HostPort {
             Message::Sense => Message::Moved(outside.embodiment.feedback()),
             Message::Command(command) => match outside.embodiment.command(command) {
                 Ok(feedback) => Message::Moved(feedback),
+                // Nobody is there to take another command: the episode ends.
+                Err(EmbodimentError::Failed { reason }) => Message::Broken { reason },
                 Err(error) => refusal(&error),
             },
             Message::Wait { seconds } => {
@@ -63,10 +67,6 @@ impl Core<Message> for HostPort {
                     Ok(_) => Message::Waited,
                     Err(error) => Message::Broken { reason: error.to_string() },
                 }
-            }
-            Message::Interrupt => {
-                outside.embodiment.stop();
-                return Ok(());
             }
             other => return Err(CoreError(format!("{HOST} cannot handle {other:?}"))),
         };

@@ -21,6 +21,7 @@
 //! | [`episode`] | the closed loop (the paper's Algorithm 1) |
 //! | [`perception`], [`memory`], [`planner`], [`executor`], [`verifier`] | the five actors |
 //! | [`host`] | the port to the outside world |
+//! | [`remote`] | an outside world in another process |
 
 pub mod agent;
 pub mod episode;
@@ -30,6 +31,7 @@ pub mod memory;
 pub mod message;
 pub mod perception;
 pub mod planner;
+pub mod remote;
 pub mod report;
 pub mod verifier;
 

@@ -8,24 +8,26 @@ use acm_runtime::{
     envelope::Envelope,
     frame_bus::FrameBus,
 };
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError, Weak};
 
 /// The memory actor. The memory itself outlives the actor: after a restart the new one goes on with the same store.
+/// It belongs to the agent alone, so that with the agent it is closed at once, and not when the last actor is gone.
 pub struct MemoryActor {
-    memory: Arc<Mutex<Box<dyn Memory>>>,
+    memory: Weak<Mutex<Box<dyn Memory>>>,
     bus: Arc<dyn FrameBus<RgbdFrame>>,
 }
 
 impl MemoryActor {
     /// An actor that writes `memory` and finds the frames behind percepts on `bus`.
-    pub fn new(memory: Arc<Mutex<Box<dyn Memory>>>, bus: Arc<dyn FrameBus<RgbdFrame>>) -> MemoryActor {
+    pub fn new(memory: Weak<Mutex<Box<dyn Memory>>>, bus: Arc<dyn FrameBus<RgbdFrame>>) -> MemoryActor {
         MemoryActor { memory, bus }
     }
 }
 
 impl Core<Message> for MemoryActor {
     fn handle(&mut self, message: Envelope<Message>, outbox: &mut Outbox<Message>) -> Result<(), CoreError> {
-        let mut memory = self.memory.lock().unwrap_or_else(PoisonError::into_inner);
+        let memory = self.memory.upgrade().ok_or_else(|| CoreError("the agent that owns the memory is gone".into()))?;
+        let mut memory = memory.lock().unwrap_or_else(PoisonError::into_inner);
         if let Message::Look { nouns, .. } = message.body {
             let expectation = acm_concept::expectation::Expectation { nouns, ..memory.expect(Time(message.time_ns)) };
             outbox.send(PERCEPTION, Message::Expected(expectation));

@@ -1,5 +1,6 @@
 //! What an episode came to.
 
+use crate::episode::Until;
 use acm_concept::{ids::ObjectId, skill::FailureCause, time::Time};
 use acm_memory::observation::Outcome;
 use acm_planner::GiveUpCause;
@@ -22,6 +23,11 @@ pub enum Ending {
     NotUnderstood {
         /// Which words, and why.
         reason: String,
+    },
+    /// The event has come at which the run was to end, and nothing more was asked for.
+    Until {
+        /// The event.
+        event: Until,
     },
     /// The user or the host ended it.
     Interrupted,

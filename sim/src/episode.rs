@@ -120,6 +120,11 @@ impl Simulation {
         Box::new(WorldClock { shared: self.shared.clone() })
     }
 
+    /// Lets a robot that was stopped be commanded again, as a person does who has looked why.
+    pub fn resume(&self) {
+        self.world().resume();
+    }
+
     /// How the episode stands. Reading it does not change the world.
     pub fn verdict(&self) -> OracleVerdict {
         self.world().verdict()

@@ -250,6 +250,11 @@ impl World {
         self.target = self.gripper.tcp(&self.physics);
     }
 
+    /// Takes a stop back.
+    pub(crate) fn resume(&mut self) {
+        self.stopped = false;
+    }
+
     /// Lets the world go on with the robot holding still.
     pub(crate) fn wait_until(&mut self, moment: Time) -> Result<Time, EmbodimentError> {
         if moment.seconds_since(self.now()) > MAX_WAIT_S {

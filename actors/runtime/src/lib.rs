@@ -9,7 +9,7 @@
 //! | [`core`] | the trait of an actor's pure logic, and its outbox |
 //! | [`system`] | shells on ractor: sequencing, write-ahead journal, supervision and restart |
 //! | [`journal`] | where delivered messages are written before they are handled |
-//! | [`frame_bus`] | frames handed over by number instead of by copy |
+//! | [`frame_bus`] | frames handed over by number instead of by copy, within a process and between processes |
 
 pub mod core;
 pub mod envelope;

@@ -74,12 +74,21 @@ pub struct SystemBuilder<M> {
     notice: Option<(Role, FailureNotice<M>)>,
     max_restarts: u32,
     panic_at: Option<PanicAt>,
+    time_ns: u64,
 }
 
 impl<M: Payload> SystemBuilder<M> {
     /// A system without actors whose messages go to `journal`.
     pub fn new(episode: u32, journal: Arc<dyn Journal<M>>) -> SystemBuilder<M> {
-        SystemBuilder { episode, factories: BTreeMap::new(), journal, notice: None, max_restarts: 3, panic_at: None }
+        SystemBuilder {
+            episode,
+            factories: BTreeMap::new(),
+            journal,
+            notice: None,
+            max_restarts: 3,
+            panic_at: None,
+            time_ns: 0,
+        }
     }
     /// Adds an actor.
     pub fn actor(mut self, role: Role, factory: Factory<M>) -> Self {
@@ -96,6 +105,11 @@ impl<M: Payload> SystemBuilder<M> {
         self.max_restarts = max_restarts;
         self
     }
+    /// The virtual time at the start, nanoseconds: a world may be older than the system that joins it.
+    pub fn starts_at(mut self, time_ns: u64) -> Self {
+        self.time_ns = time_ns;
+        self
+    }
     /// Sets a fault for tests.
     pub fn panic_at(mut self, panic_at: Option<PanicAt>) -> Self {
         self.panic_at = panic_at;
@@ -108,6 +122,7 @@ impl<M: Payload> SystemBuilder<M> {
         let shared = Arc::new(Shared {
             episode: self.episode,
             sequence: AtomicU64::new(0),
+            latest_ns: AtomicU64::new(self.time_ns),
             addresses: Mutex::new(BTreeMap::new()),
             journal: self.journal,
             outside,
@@ -130,9 +145,9 @@ pub struct System<M: Payload> {
 }
 
 impl<M: Payload> System<M> {
-    /// Sends a message from outside.
+    /// Sends a message from outside, at the latest virtual time that a message had.
     pub fn send(&self, to: Role, body: M) {
-        self.shared.deliver(OUTSIDE, to, None, 0, body);
+        self.shared.deliver(OUTSIDE, to, None, self.shared.latest_ns(), body);
     }
     /// Waits for the next message that an actor sends outside.
     pub async fn result(&mut self, limit: Duration) -> Result<M, SystemError> {
@@ -157,6 +172,8 @@ impl<M: Payload> System<M> {
 struct Shared<M> {
     episode: u32,
     sequence: AtomicU64,
+    /// The latest virtual time of a message: who has no clock of his own sends at this time.
+    latest_ns: AtomicU64,
     addresses: Mutex<BTreeMap<Role, ActorRef<Envelope<M>>>>,
     journal: Arc<dyn Journal<M>>,
     outside: mpsc::Sender<M>,
@@ -168,10 +185,14 @@ struct Shared<M> {
 }
 
 impl<M: Payload> Shared<M> {
+    fn latest_ns(&self) -> u64 {
+        self.latest_ns.load(Ordering::SeqCst)
+    }
     /// Numbers a message and puts it into the receiver's mailbox. With one request in flight the order of
     /// numbers is the order of handling.
     fn deliver(&self, from: Role, to: Role, cause: Option<u64>, time_ns: u64, body: M) {
         let seq = self.sequence.fetch_add(1, Ordering::SeqCst) + 1;
+        self.latest_ns.fetch_max(time_ns, Ordering::SeqCst);
         let envelope = Envelope { seq, cause, episode: self.episode, from, to, time_ns, body };
         if to == OUTSIDE {
             if let Err(error) = self.journal.record(&envelope) {

@@ -6,6 +6,7 @@ use acm_concept::{
     time::Time,
 };
 use acm_memory::observation::{Executed, Outcome};
+use serde::Serialize;
 use std::{collections::BTreeMap, str::FromStr};
 use thiserror::Error;
 
@@ -50,6 +51,30 @@ pub enum WipeAt {
     Instruction,
     /// When the first skill of this name was verified.
     FirstVerified(String),
+}
+
+/// The event at which a run is to end.
+///
+/// ```
+/// # use acm_actors::episode::Until;
+/// assert_eq!("instruction".parse(), Ok(Until::Instruction));
+/// assert!("noon".parse::<Until>().is_err());
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Until {
+    /// When the instruction would be given.
+    Instruction,
+}
+
+impl FromStr for Until {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "instruction" => Ok(Until::Instruction),
+            _ => Err(format!("`{text}` is no event at which a run can end: write `instruction`")),
+        }
+    }
 }
 
 /// A text that names no event.

@@ -62,7 +62,8 @@ impl<M: Payload> Supervisor<M> {
         }
         if let Some((to, notice)) = &self.notice {
             let to = if *to == role { OUTSIDE } else { *to };
-            self.shared.deliver(Role("supervisor"), to, None, 0, notice(Failure { role, reason, restarted }));
+            let now = self.shared.latest_ns();
+            self.shared.deliver(Role("supervisor"), to, None, now, notice(Failure { role, reason, restarted }));
         }
     }
 }

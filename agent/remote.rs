@@ -1,0 +1,53 @@
+//! `acm run --robot`: an episode on a robot in another process.
+
+use crate::{
+    cli::{Exit, RunArgs},
+    episode::Runner,
+    narrate::Narrator,
+    run::{Source, exit_of, prepare, tell_result},
+};
+use acm_actors::{
+    message::Message,
+    remote::{Carrier, RemoteRobot},
+    report::Ending,
+};
+use acm_runtime::journal::{Journal, NoJournal};
+use anyhow::{Context, ensure};
+use std::{io::Write, sync::Arc};
+
+/// The name under which the agent says hello.
+const AGENT: &str = concat!("acm ", env!("CARGO_PKG_VERSION"));
+
+/// Runs one episode on the robot that `args` names.
+pub fn run(args: &RunArgs) -> anyhow::Result<Exit> {
+    let address = args.robot.as_ref().context("no robot is named")?;
+    ensure!(!args.seed.range, "a robot has one world at a time: give one seed, not a range");
+    let (config, library) = prepare(args)?;
+    ensure!(
+        config.faults.slip_at.is_none(),
+        "slip@N happens in the world: give it to its host, such as `acm sim serve --inject slip@N`"
+    );
+    let robot = RemoteRobot::connect(address, AGENT, args.frames)?;
+    let runner = Runner::without_renderer(library)?;
+    runner.end_on_ctrl_c();
+    if let Some(reason) = robot.fallback() {
+        eprintln!("acm: frames come inline: {reason}");
+    }
+    let journal: Arc<dyn Journal<Message>> = match args.json {
+        true => Arc::new(NoJournal),
+        false => {
+            let frames = match robot.carrier() {
+                Carrier::SharedMemory => "through shared memory",
+                Carrier::Inline => "inline",
+            };
+            writeln!(std::io::stdout(), "{} at {address}, frames {frames}", robot.host())?;
+            Arc::new(Narrator::new(Box::new(std::io::stdout())))
+        }
+    };
+    let result = runner.run_remote(&robot, args.seed.first, &config, journal)?;
+    tell_result(&Source { name: &address.to_string(), sensor: "the host's" }, args, &result)?;
+    if let Ending::Broken { reason } = &result.report.ending {
+        eprintln!("acm: the run broke off: {reason}");
+    }
+    Ok(exit_of(&result))
+}
