@@ -1,6 +1,7 @@
 //! The command line and its exit codes.
 
-use crate::{demo, doctor, inject::Injection, perceive, run, scenario};
+use crate::{demo, doctor, inject::Injection, perceive, run, scenario, trace};
+use acm_actors::trace::FrameDetail;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::{path::PathBuf, process::ExitCode, str::FromStr};
 
@@ -59,6 +60,9 @@ pub enum Command {
     /// List, check, describe or draw scenarios.
     #[command(subcommand)]
     Scenario(ScenarioCommand),
+    /// Look into the traces that `acm run --trace` writes.
+    #[command(subcommand)]
+    Trace(TraceCommand),
     /// Say what this machine has of what ACM needs.
     Doctor,
 }
@@ -143,6 +147,13 @@ pub struct RunArgs {
     /// Another sensor profile than the scenario's: none, d435, d435-hard.
     #[arg(long, value_name = "PROFILE")]
     pub sensor: Option<String>,
+    /// Write every message, effect and change of memory into this MCAP file. Of a range, or in a folder, each run has
+    /// a file of its own.
+    #[arg(long, value_name = "FILE")]
+    pub trace: Option<PathBuf>,
+    /// What the trace keeps of each frame beside its hash: full, thumbnail or hash.
+    #[arg(long, value_name = "DETAIL", default_value = "thumbnail")]
+    pub trace_frames: FrameDetail,
     /// Print the results as JSON instead of text.
     #[arg(long)]
     pub json: bool,
@@ -216,6 +227,51 @@ pub enum ScenarioCommand {
     },
 }
 
+/// The verbs of `acm trace`.
+#[derive(Debug, Subcommand)]
+pub enum TraceCommand {
+    /// One line for each run in a folder: what was run, and how it ended.
+    Ls(TraceLsArgs),
+    /// The messages of a run as a table; or one step's decision; or one message in full.
+    Show(TraceShowArgs),
+}
+
+/// Arguments of `acm trace ls`.
+#[derive(Debug, Args)]
+pub struct TraceLsArgs {
+    /// A folder with traces, or one trace.
+    #[arg(default_value = ".")]
+    pub path: PathBuf,
+    /// Print JSON instead of text.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `acm trace show`.
+#[derive(Debug, Args)]
+pub struct TraceShowArgs {
+    /// The trace.
+    pub file: PathBuf,
+    /// The decision behind the Nth skill that was run: candidates, preconditions, prediction, verdict.
+    #[arg(long, value_name = "N", conflicts_with_all = ["seq", "json"])]
+    pub step: Option<usize>,
+    /// The message of this number, in full.
+    #[arg(long, value_name = "N")]
+    pub seq: Option<u64>,
+    /// Only messages from or to this actor.
+    #[arg(long, value_name = "A")]
+    pub actor: Option<String>,
+    /// Only messages of this kind.
+    #[arg(long, value_name = "K")]
+    pub kind: Option<String>,
+    /// Only messages whose line or body has this word, small or capital.
+    #[arg(long, value_name = "WORD")]
+    pub text: Option<String>,
+    /// Print JSON instead of text: the messages in full.
+    #[arg(long)]
+    pub json: bool,
+}
+
 /// Performs a command.
 pub fn run(cli: Cli) -> anyhow::Result<Exit> {
     match cli.command {
@@ -223,6 +279,7 @@ pub fn run(cli: Cli) -> anyhow::Result<Exit> {
         Command::Demo(args) => demo::run(&args),
         Command::Perceive(args) => perceive::run(&args),
         Command::Scenario(command) => scenario::run(&command),
+        Command::Trace(command) => trace::run(&command),
         Command::Doctor => doctor::run(),
     }
 }

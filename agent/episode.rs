@@ -1,11 +1,15 @@
 //! One episode: simulator, agent, judge.
 
-use crate::inject::{Faults, FrameTap};
+use crate::{
+    inject::{Faults, FrameTap},
+    trace::recording::{Recording, TraceRequest},
+};
 use acm_actors::{
     Agent,
     agent::Interrupt,
     message::Message,
     report::{Ending, EpisodeReport},
+    trace::Trace,
 };
 use acm_concept::{
     embodiment::{Command, Embodiment, EmbodimentError, Feedback, RobotDescription},
@@ -46,6 +50,8 @@ pub struct EpisodeConfig {
     pub sensor: Option<String>,
     /// Keeps frames on their way to the agent.
     pub frames: Option<FrameTap>,
+    /// Where all of the run is written down.
+    pub trace: Option<TraceRequest>,
     /// For tests: the actor of this name panics at its nth message.
     pub panic_at: Option<(String, u64)>,
 }
@@ -130,6 +136,22 @@ impl Runner {
         config: &EpisodeConfig,
         journal: Arc<dyn Journal<Message>>,
     ) -> anyhow::Result<EpisodeResult> {
+        let Some(request) = &config.trace else { return self.episode(scenario, seed, config, journal, None) };
+        let recording = Recording::begin(request, scenario, seed, config, &self.adapter())?;
+        let result = self.episode(scenario, seed, config, journal, Some(recording.trace()));
+        let finished = recording.end(&result);
+        // What went wrong first is what is told.
+        result.and_then(|result| finished.map(|()| result))
+    }
+
+    fn episode(
+        &self,
+        scenario: &Scenario,
+        seed: u64,
+        config: &EpisodeConfig,
+        journal: Arc<dyn Journal<Message>>,
+        trace: Option<Arc<Trace>>,
+    ) -> anyhow::Result<EpisodeResult> {
         let options = SimOptions {
             seed,
             slip_at: config.faults.slip_at,
@@ -147,6 +169,7 @@ impl Runner {
             .seed(seed)
             .wipe_at(config.faults.wipe_at.clone())
             .journal(journal)
+            .trace(trace)
             .panic_at(config.panic_at.as_ref().and_then(|(role, message)| fault_of(role, *message)))
             .build()?;
         let mut task = simulation.task();

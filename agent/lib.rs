@@ -10,6 +10,7 @@
 //! | [`demo`] | `acm demo`: the first minute |
 //! | [`perceive`] | `acm perceive`: real frames, no simulator |
 //! | [`scenario`], [`doctor`] | `acm scenario`, `acm doctor` |
+//! | [`trace`] | `acm trace`: a run written down, and looked into |
 //! | [`statistics`] | proportions with intervals |
 
 pub mod cli;
@@ -22,3 +23,4 @@ pub mod perceive;
 pub mod run;
 pub mod scenario;
 pub mod statistics;
+pub mod trace;

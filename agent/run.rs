@@ -6,6 +6,7 @@ use crate::{
     inject::Faults,
     narrate::Narrator,
     statistics::{median_and, wilson95},
+    trace::recording::TraceRequest,
 };
 use acm_actors::report::Ending;
 use acm_runtime::journal::NoJournal;
@@ -30,6 +31,7 @@ pub fn run(args: &RunArgs) -> anyhow::Result<Exit> {
         no_motion: args.no_motion,
         sensor: args.sensor.clone(),
         frames: None,
+        trace: None,
         panic_at: None,
     };
     let library = match &args.library {
@@ -47,6 +49,7 @@ pub fn run(args: &RunArgs) -> anyhow::Result<Exit> {
 }
 
 fn one(runner: &Runner, scenario: &Scenario, args: &RunArgs, config: &EpisodeConfig) -> anyhow::Result<Exit> {
+    let config = &traced(scenario, args, config, args.seed.first);
     let result = if args.json {
         runner.run(scenario, args.seed.first, config, Arc::new(NoJournal))?
     } else {
@@ -70,7 +73,7 @@ fn many(runner: &Runner, scenario: &Scenario, args: &RunArgs, config: &EpisodeCo
     let bar = progress(count, args.json);
     let mut results = Vec::new();
     for seed in args.seed.first..=args.seed.last {
-        let result = runner.run(scenario, seed, config, Arc::new(NoJournal))?;
+        let result = runner.run(scenario, seed, &traced(scenario, args, config, seed), Arc::new(NoJournal))?;
         tell(&bar, args.json, &line(&result))?;
         bar.inc(1);
         let interrupted = result.report.ending == Ending::Interrupted;
@@ -90,6 +93,13 @@ fn many(runner: &Runner, scenario: &Scenario, args: &RunArgs, config: &EpisodeCo
         print_times(&results)?;
     }
     Ok(exit_of_range(&results, count as usize))
+}
+
+/// The configuration of one seed: its trace is a file of its own.
+fn traced(scenario: &Scenario, args: &RunArgs, config: &EpisodeConfig, seed: u64) -> EpisodeConfig {
+    let request =
+        |target| TraceRequest::for_seed(target, args.trace_frames, config, scenario.name(), seed, args.seed.range);
+    EpisodeConfig { trace: args.trace.as_deref().map(request), ..config.clone() }
 }
 
 /// One line an episode: above the bar on a terminal, on standard output elsewhere; none with JSON.
@@ -138,13 +148,7 @@ fn exit_of_range(results: &[EpisodeResult], asked: usize) -> Exit {
 
 /// How an episode ended, in words.
 pub fn ending_words(ending: &Ending) -> String {
-    match ending {
-        Ending::Done => "done".into(),
-        Ending::GaveUp { unknown, .. } => format!("gave up: {unknown}"),
-        Ending::NotUnderstood { reason } => format!("not understood: {reason}"),
-        Ending::Interrupted => "interrupted".into(),
-        Ending::Broken { reason } => format!("broken: {reason}"),
-    }
+    ending.to_string()
 }
 
 fn line(result: &EpisodeResult) -> String {

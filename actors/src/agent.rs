@@ -4,11 +4,12 @@ use crate::{
     episode::{Episode, WipeAt},
     executor::ExecutorActor,
     host::{HostPort, Outside},
-    memory::MemoryActor,
+    memory::{MemoryActor, MemoryObserver},
     message::{EPISODE, EXECUTOR, HOST, MEMORY, Message, PERCEPTION, PLANNER, VERIFIER},
     perception::PerceptionActor,
     planner::PlannerActor,
     report::EpisodeReport,
+    trace::Trace,
     verifier::VerifierActor,
 };
 use acm_concept::{
@@ -23,12 +24,12 @@ use acm_planner::{PlanOptions, Planner};
 use acm_runtime::{
     envelope::Role,
     frame_bus::{FrameBus, InProcessBus},
-    journal::{Journal, NoJournal},
+    journal::{Both, Journal, JournalError, NoJournal},
     system::{PanicAt, SystemBuilder, SystemError},
 };
 use std::{
     collections::BTreeMap,
-    sync::{Arc, Mutex},
+    sync::{Arc, Mutex, PoisonError},
     time::Duration,
 };
 use thiserror::Error;
@@ -50,6 +51,9 @@ pub enum AgentError {
     /// The actors could not be started or gave no result.
     #[error(transparent)]
     System(#[from] SystemError),
+    /// The trace could not be begun.
+    #[error(transparent)]
+    Trace(#[from] JournalError),
 }
 
 /// What an agent is made of. Everything has a default but the world and the memory.
@@ -60,6 +64,7 @@ pub struct AgentBuilder {
     seed: u64,
     grounder: GrounderConfig,
     journal: Arc<dyn Journal<Message>>,
+    trace: Option<Arc<Trace>>,
     wipe_at: Option<WipeAt>,
     panic_at: Option<PanicAt>,
 }
@@ -83,6 +88,11 @@ impl AgentBuilder {
     /// Where messages are written before they are handled.
     pub fn journal(mut self, journal: Arc<dyn Journal<Message>>) -> Self {
         self.journal = journal;
+        self
+    }
+    /// Writes all of a run into a trace: messages, frames, changes of memory. One run for one trace.
+    pub fn trace(mut self, trace: Option<Arc<Trace>>) -> Self {
+        self.trace = trace;
         self
     }
     /// Wipes memory at an event, as a fault for tests.
@@ -138,6 +148,7 @@ impl Agent {
             seed: 0,
             grounder: GrounderConfig::default(),
             journal: Arc::new(NoJournal),
+            trace: None,
             wipe_at: None,
             panic_at: None,
         }
@@ -158,6 +169,14 @@ impl Agent {
         interrupt: &Interrupt,
     ) -> Result<EpisodeRun, AgentError> {
         let camera = task.cameras.first().ok_or(AgentError::NoCamera)?.name.clone();
+        let cameras = match &self.parts.trace {
+            Some(trace) => {
+                let memory = self.parts.memory.lock().unwrap_or_else(PoisonError::into_inner);
+                trace.begin(&task, embodiment.description(), &**memory)?;
+                trace.cameras(cameras)
+            }
+            None => cameras,
+        };
         let outside = Arc::new(Mutex::new(Outside { embodiment, cameras, clock }));
         let mut system = self.system(task, camera, outside).start().await?;
         system.send(EPISODE, Message::Begin);
@@ -183,14 +202,19 @@ impl Agent {
     fn system(&self, task: TaskSpec, camera: String, outside: Arc<Mutex<Outside>>) -> SystemBuilder<Message> {
         let parts = &self.parts;
         let bus: Arc<dyn FrameBus<RgbdFrame>> = Arc::new(InProcessBus::new(BUS_FRAMES));
-        let robot = outside.lock().unwrap_or_else(std::sync::PoisonError::into_inner).embodiment.description().clone();
+        let robot = outside.lock().unwrap_or_else(PoisonError::into_inner).embodiment.description().clone();
         let grounder = Arc::new(Grounder::new(Arc::clone(&parts.library), parts.grounder.clone()));
         let options = PlanOptions { on_unknown: parts.on_unknown, seed: parts.seed };
         let (memory, wipe_at) = (Arc::clone(&parts.memory), parts.wipe_at.clone());
         let (planner, library) = (Arc::clone(&self.planner), Arc::clone(&parts.library));
         let (frames, seen, kept) = (Arc::clone(&bus), Arc::clone(&bus), bus);
         let (eyes, hands, plans) = (robot.clone(), robot.clone(), robot);
-        SystemBuilder::new(1, Arc::clone(&parts.journal))
+        let journal: Arc<dyn Journal<Message>> = match &parts.trace {
+            Some(trace) => Arc::new(Both(Arc::clone(trace) as Arc<dyn Journal<Message>>, Arc::clone(&parts.journal))),
+            None => Arc::clone(&parts.journal),
+        };
+        let observer = parts.trace.clone().map(|trace| trace as Arc<dyn MemoryObserver>);
+        SystemBuilder::new(1, journal)
             .actor(EPISODE, Box::new(move || Box::new(Episode::new(task.clone(), wipe_at.clone()))))
             .actor(
                 HOST,
@@ -202,7 +226,13 @@ impl Agent {
                     Box::new(PerceptionActor::new(Arc::clone(&grounder), eyes.clone(), Arc::clone(&seen)))
                 }),
             )
-            .actor(MEMORY, Box::new(move || Box::new(MemoryActor::new(Arc::clone(&memory), Arc::clone(&kept)))))
+            .actor(
+                MEMORY,
+                Box::new(move || {
+                    let actor = MemoryActor::new(Arc::clone(&memory), Arc::clone(&kept));
+                    Box::new(actor.observed_by(observer.clone()))
+                }),
+            )
             .actor(
                 PLANNER,
                 Box::new(move || {
