@@ -154,6 +154,9 @@ pub struct RunArgs {
     /// What the trace keeps of each frame beside its hash: full, thumbnail or hash.
     #[arg(long, value_name = "DETAIL", default_value = "thumbnail")]
     pub trace_frames: FrameDetail,
+    /// Draw the episode into this GIF: what is seen, what is remembered, what is planned. One seed only.
+    #[arg(long, value_name = "FILE.gif")]
+    pub video: Option<PathBuf>,
     /// Print the results as JSON instead of text.
     #[arg(long)]
     pub json: bool,

@@ -11,6 +11,7 @@
 //! | [`perceive`] | `acm perceive`: real frames, no simulator |
 //! | [`scenario`], [`doctor`] | `acm scenario`, `acm doctor` |
 //! | [`trace`] | `acm trace`: a run written down, and looked into |
+//! | [`video`] | `acm run --video`: an episode as moving pictures |
 //! | [`statistics`] | proportions with intervals |
 
 pub mod cli;
@@ -24,3 +25,4 @@ pub mod run;
 pub mod scenario;
 pub mod statistics;
 pub mod trace;
+pub mod video;

@@ -7,9 +7,10 @@ use crate::{
     narrate::Narrator,
     statistics::{median_and, wilson95},
     trace::recording::TraceRequest,
+    video::{Camera, VideoFile},
 };
-use acm_actors::report::Ending;
-use acm_runtime::journal::NoJournal;
+use acm_actors::{message::Message, report::Ending};
+use acm_runtime::journal::{Both, Journal, NoJournal};
 use acm_sim::Scenario;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
@@ -22,6 +23,7 @@ use std::{
 /// Runs `acm run`.
 pub fn run(args: &RunArgs) -> anyhow::Result<Exit> {
     let scenario = Scenario::open(&args.scenario)?;
+    let video = args.video.as_deref().map(|path| VideoFile::create(path, args.seed.range)).transpose()?;
     let config = EpisodeConfig {
         method: args.method.clone(),
         on_unknown: args.on_unknown.into(),
@@ -43,20 +45,34 @@ pub fn run(args: &RunArgs) -> anyhow::Result<Exit> {
     let runner = Runner::with_library(library)?;
     runner.end_on_ctrl_c();
     match args.seed.range {
-        false => one(&runner, &scenario, args, &config),
+        false => one(&runner, &scenario, args, &config, video),
         true => many(&runner, &scenario, args, &config),
     }
 }
 
-fn one(runner: &Runner, scenario: &Scenario, args: &RunArgs, config: &EpisodeConfig) -> anyhow::Result<Exit> {
-    let config = &traced(scenario, args, config, args.seed.first);
-    let result = if args.json {
-        runner.run(scenario, args.seed.first, config, Arc::new(NoJournal))?
+fn one(
+    runner: &Runner,
+    scenario: &Scenario,
+    args: &RunArgs,
+    config: &EpisodeConfig,
+    video: Option<VideoFile>,
+) -> anyhow::Result<Exit> {
+    let mut config = traced(scenario, args, config, args.seed.first);
+    let mut journal: Arc<dyn Journal<Message>> = if args.json {
+        Arc::new(NoJournal)
     } else {
         println!("{} seed {}: {}", scenario.name(), args.seed.first, scenario.summary());
-        let narrator = Arc::new(Narrator::new(Box::new(std::io::stdout())));
-        runner.run(scenario, args.seed.first, config, narrator)?
+        Arc::new(Narrator::new(Box::new(std::io::stdout())))
     };
+    let camera = Arc::new(Camera::new(Arc::clone(runner.library())));
+    if video.is_some() {
+        config.frames = Some(camera.tap());
+        journal = Arc::new(Both(journal, Arc::clone(&camera) as Arc<dyn Journal<Message>>));
+    }
+    let result = runner.run(scenario, args.seed.first, &config, journal)?;
+    if let Some(video) = video {
+        video.write(&camera.pictures(ending_of(&result)))?;
+    }
     if args.json {
         let runs = Runs::new(scenario, args, std::slice::from_ref(&result));
         serde_json::to_writer_pretty(std::io::stdout().lock(), &runs)?;
@@ -121,6 +137,12 @@ fn progress(count: u64, hidden: bool) -> ProgressBar {
         Ok(style) => bar.with_style(style),
         Err(_template) => bar,
     }
+}
+
+/// The last line of a video: how it ended, and what the judge says.
+fn ending_of(result: &EpisodeResult) -> String {
+    let judge = if result.verdict.strict { "success" } else { "no success" };
+    format!("{} (judge: {judge})", result.report.ending)
 }
 
 /// The exit of one episode.
