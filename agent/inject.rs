@@ -137,13 +137,13 @@ impl CameraSource for FaultyCamera {
     fn capture(&mut self, camera: &str) -> Result<RgbdFrame, CameraError> {
         let mut frame = self.cameras.capture(camera)?;
         if self.black {
-            frame.color = Arc::from(vec![0; frame.color.len()]);
-            frame.depth = Arc::from(vec![0.0; frame.depth.len()]);
+            frame.color = vec![0; frame.color.len()].into();
+            frame.depth = vec![0.0; frame.depth.len()].into();
             return Ok(frame);
         }
         let first = self.first.get_or_insert_with(|| frame.clone());
-        frame.color = Arc::clone(&first.color);
-        frame.depth = Arc::clone(&first.depth);
+        frame.color = first.color.clone();
+        frame.depth = first.depth.clone();
         Ok(frame)
     }
 }

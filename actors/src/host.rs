@@ -39,8 +39,10 @@ impl HostPort {
         match outside.cameras.capture(&self.camera) {
             Ok(frame) => {
                 let header = frame.header.clone();
-                self.bus.publish(header.id.0, Arc::new(frame));
-                Message::Frame { header, feedback: outside.embodiment.feedback() }
+                match self.bus.publish(header.id.0, Arc::new(frame)) {
+                    Ok(()) => Message::Frame { header, feedback: outside.embodiment.feedback() },
+                    Err(error) => Message::Broken { reason: error.to_string() },
+                }
             }
             Err(error) => Message::Broken { reason: error.to_string() },
         }

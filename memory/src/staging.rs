@@ -21,7 +21,7 @@ use acm_concept::{
     time::Time,
 };
 use glam::DVec3;
-use std::{collections::BTreeMap, sync::Arc};
+use std::collections::BTreeMap;
 
 /// How surely staged positions and sizes are seen, metres.
 pub const SIGMA_M: f64 = 0.003;
@@ -224,7 +224,7 @@ pub fn look_blind(
 
 fn show(memory: &mut dyn Memory, percepts: &Percepts, hand: &Feedback) -> Result<Grounding, MemoryError> {
     let header = percepts.frame.clone();
-    let frame = RgbdFrame { header, color: Arc::from([0u8; 3].as_slice()), depth: Arc::from([0f32].as_slice()) };
+    let frame = RgbdFrame { header, color: vec![0; 3].into(), depth: vec![0.0].into() };
     memory.observe(&Observation { percepts, frame: &frame, feedback: hand })
 }
 

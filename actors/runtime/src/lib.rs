@@ -10,7 +10,7 @@
 //! | [`system`] | shells on ractor: sequencing, write-ahead journal, supervision and restart |
 //! | [`journal`] | where delivered messages are written before they are handled |
 //! | [`trace`] | all of a run in one MCAP file: written, and read back |
-//! | [`frame_bus`] | frames handed over by number instead of by copy |
+//! | [`frame_bus`] | frames handed over by number instead of by copy, within a process and between processes |
 
 pub mod core;
 pub mod envelope;

@@ -1,9 +1,8 @@
 //! RGB-D frames, calibration as the agent knows it, and the trait of a camera.
 
-use crate::{ids::FrameId, pose::Pose, time::Time};
+use crate::{ids::FrameId, plane::Plane, pose::Pose, time::Time};
 use glam::{DVec2, DVec3};
 use serde::{Deserialize, Serialize};
-use std::sync::Arc;
 use thiserror::Error;
 
 /// Most pixels of a frame that any of our readers accepts.
@@ -103,9 +102,9 @@ pub struct RgbdFrame {
     /// Number, camera, time, calibration.
     pub header: FrameHeader,
     /// 8-bit sRGB, row by row, `3 * width * height` bytes.
-    pub color: Arc<[u8]>,
+    pub color: Plane<u8>,
     /// Depth along the optical axis in metres, `width * height` values; 0 where nothing was measured.
-    pub depth: Arc<[f32]>,
+    pub depth: Plane<f32>,
 }
 
 /// Planes that do not belong to the header.
@@ -121,7 +120,7 @@ pub struct FrameSizeError {
 
 impl RgbdFrame {
     /// Joins a header and its planes.
-    pub fn new(header: FrameHeader, color: Arc<[u8]>, depth: Arc<[f32]>) -> Result<RgbdFrame, FrameSizeError> {
+    pub fn new(header: FrameHeader, color: Plane<u8>, depth: Plane<f32>) -> Result<RgbdFrame, FrameSizeError> {
         let pixels = header.intrinsics.pixels();
         let check = |plane, expected, actual| {
             if expected == actual {

@@ -10,7 +10,7 @@
 //! | [`solid`], [`expression`], [`template`] | solids, expressions over parameters, the template library |
 //! | [`object`] | grounded parts and objects as perception reports them |
 //! | [`literal`] | state literals and three-valued truth |
-//! | [`camera`], [`embodiment`] | frames, calibration, what a real arm takes and reports; the traits of the outside world |
+//! | [`camera`], [`plane`], [`embodiment`] | frames and their pixels, calibration, what a real arm takes and reports; the traits of the outside world |
 //! | [`primitive`], [`skill`] | the nine primitives, skill invocations and their reports |
 //! | [`expectation`], [`task`] | what memory expects to be seen; what the agent is told of its task |
 //!
@@ -26,6 +26,7 @@ pub mod expression;
 pub mod ids;
 pub mod literal;
 pub mod object;
+pub mod plane;
 pub mod pose;
 pub mod primitive;
 pub mod skill;

@@ -1,0 +1,110 @@
+//! The writing end.
+
+use super::{
+    super::{ByteFrame, MAX_FRAME_BYTES, MAX_PLANES, PublishError},
+    BusError, BusLimits, Events, Frames, Service, check_room,
+    chunk::{FrameTag, fill, payload_bytes},
+    join,
+};
+use iceoryx2::{
+    port::{LoanError, notifier::Notifier, publisher::Publisher},
+    prelude::{AllocationStrategy, Node},
+};
+use std::{
+    fmt,
+    sync::{Mutex, PoisonError},
+    time::Duration,
+};
+
+/// How long another process is waited for that is cleaning up after a dead one.
+const CLEANUP_LIMIT: Duration = Duration::from_millis(500);
+
+/// The end of a shared-memory bus that frames come from. Dropping it ends the bus; frames that readers hold stay valid.
+pub struct SharedMemoryWriter {
+    name: String,
+    places: u64,
+    ports: Mutex<Ports>,
+}
+
+struct Ports {
+    last: Option<u64>,
+    /// Payload bytes of the largest frame so far: places of that size exist already.
+    largest: usize,
+    publisher: Publisher<Service, [u8], FrameTag>,
+    notifier: Notifier<Service>,
+    // Kept open as long as the ports are.
+    _services: (Frames, Events),
+    node: Node<Service>,
+}
+
+impl fmt::Debug for SharedMemoryWriter {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "SharedMemoryWriter({})", self.name)
+    }
+}
+
+impl SharedMemoryWriter {
+    /// A new bus of the given name, which should hold [`super::run_id`]. Room is made for frames of `frame_bytes`;
+    /// larger ones get more when they come.
+    ///
+    /// # Errors
+    /// No shared memory or not enough of it, a name that cannot be used, or that is in use.
+    pub fn create(name: &str, limits: BusLimits, frame_bytes: usize) -> Result<SharedMemoryWriter, BusError> {
+        let (places, largest) = (limits.places() as u64, payload_bytes(frame_bytes));
+        check_room(places * largest as u64)?;
+        let joined = join(name, &limits, true)?;
+        let setup = |reason: String| BusError::Setup { name: name.into(), action: "created", reason };
+        let publisher = joined
+            .frames
+            .publisher_builder()
+            .max_loaned_samples(1)
+            .initial_max_slice_len(largest)
+            .allocation_strategy(AllocationStrategy::BestFit)
+            .create()
+            .map_err(|e| setup(e.to_string()))?;
+        let notifier = joined.events.notifier_builder().create().map_err(|e| setup(e.to_string()))?;
+        let (_services, node) = ((joined.frames, joined.events), joined.node);
+        let ports = Ports { last: None, largest, publisher, notifier, _services, node };
+        Ok(SharedMemoryWriter { name: name.into(), places, ports: Mutex::new(ports) })
+    }
+
+    /// The name by which readers find the bus.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Copies a frame into shared memory and tells those who wait; numbers must rise. Never waits for a reader.
+    ///
+    /// # Errors
+    /// See [`PublishError`]; after an error the bus is as before.
+    pub fn publish(&self, number: u64, frame: &ByteFrame) -> Result<(), PublishError> {
+        let (bytes, planes) = (frame.bytes(), frame.planes.len());
+        if bytes > MAX_FRAME_BYTES || planes > MAX_PLANES {
+            return Err(PublishError::TooLarge { bytes, planes });
+        }
+        let mut ports = self.ports.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(last) = ports.last.filter(|last| *last >= number) {
+            return Err(PublishError::NotRising { number, last });
+        }
+        let length = payload_bytes(bytes);
+        let grown = length > ports.largest;
+        check_room(length as u64 * if grown { self.places } else { 1 }).map_err(PublishError::Full)?;
+        let loan = match ports.publisher.loan_slice_uninit(length) {
+            Err(LoanError::OutOfMemory) => return Err(PublishError::Port("no place is left for a frame".into())),
+            loan => loan.map_err(|e| PublishError::Port(e.to_string()))?,
+        };
+        fill(loan, number, frame).send().map_err(|e| PublishError::Port(e.to_string()))?;
+        (ports.last, ports.largest) = (Some(number), ports.largest.max(length));
+        ports.notifier.notify().map_err(|e| PublishError::Port(e.to_string()))?;
+        Ok(())
+    }
+}
+
+impl Drop for SharedMemoryWriter {
+    fn drop(&mut self) {
+        // A reader whose process was killed leaves its part of the bus behind.
+        let ports = self.ports.get_mut().unwrap_or_else(PoisonError::into_inner);
+        let state = ports.node.blocking_cleanup_dead_nodes(CLEANUP_LIMIT);
+        tracing::debug!(?state, "cleaned up after dead processes");
+    }
+}
