@@ -1,6 +1,6 @@
 //! The command line and its exit codes.
 
-use crate::{demo, doctor, inject::Injection, perceive, run, scenario, trace};
+use crate::{bench, demo, doctor, inject::Injection, perceive, run, scenario, trace};
 use acm_actors::trace::FrameDetail;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::{path::PathBuf, process::ExitCode, str::FromStr};
@@ -63,6 +63,12 @@ pub enum Command {
     /// Look into the traces that `acm run --trace` writes.
     #[command(subcommand)]
     Trace(TraceCommand),
+    /// Measure figures and print them beside what they are to reach.
+    #[command(subcommand)]
+    Bench(BenchCommand),
+    /// The other process of a bench: takes frames and says when.
+    #[command(hide = true)]
+    BenchReader(BenchReaderArgs),
     /// Say what this machine has of what ACM needs.
     Doctor,
 }
@@ -275,6 +281,39 @@ pub struct TraceShowArgs {
     pub json: bool,
 }
 
+/// The benches.
+#[derive(Debug, Subcommand)]
+pub enum BenchCommand {
+    /// Frames between processes, messages between actors, what a trace costs, how fast an actor is replaced.
+    Runtime(BenchArgs),
+}
+
+/// Arguments of every bench.
+#[derive(Debug, Args)]
+pub struct BenchArgs {
+    /// Most episodes or frames; all that there are if not given.
+    #[arg(long, value_name = "N")]
+    pub episodes: Option<usize>,
+    /// A tenth of the repetitions: to see that it works, not to compare.
+    #[arg(long)]
+    pub quick: bool,
+    /// Write the result, with all rows, into this file.
+    #[arg(long, value_name = "FILE")]
+    pub json: Option<PathBuf>,
+    /// Compare with the targets of this file instead of the built-in ones.
+    #[arg(long, value_name = "FILE")]
+    pub against: Option<PathBuf>,
+}
+
+/// Arguments of the other process of a bench.
+#[derive(Debug, Args)]
+pub struct BenchReaderArgs {
+    /// `bus` or `socket`.
+    pub way: String,
+    /// Name of the bus, or path of the socket.
+    pub name: String,
+}
+
 /// Performs a command.
 pub fn run(cli: Cli) -> anyhow::Result<Exit> {
     match cli.command {
@@ -283,6 +322,8 @@ pub fn run(cli: Cli) -> anyhow::Result<Exit> {
         Command::Perceive(args) => perceive::run(&args),
         Command::Scenario(command) => scenario::run(&command),
         Command::Trace(command) => trace::run(&command),
+        Command::Bench(command) => bench::run(&command),
+        Command::BenchReader(args) => bench::runtime::peer::run(&args),
         Command::Doctor => doctor::run(),
     }
 }

@@ -169,7 +169,7 @@ impl Runner {
             .seed(seed)
             .wipe_at(config.faults.wipe_at.clone())
             .journal(journal)
-            .trace(trace)
+            .trace(trace.clone())
             .panic_at(config.panic_at.as_ref().and_then(|(role, message)| fault_of(role, *message)))
             .build()?;
         let mut task = simulation.task();
@@ -190,6 +190,9 @@ impl Runner {
             run.spent.iter().map(|(role, time)| (role.to_string(), time.as_secs_f64())).collect();
         split_host_time(&mut spent_s, &simulation.timings());
         spent_s.insert("world-building".into(), built_s);
+        if let Some(trace) = trace {
+            spent_s.insert("trace".into(), trace.spent().as_secs_f64());
+        }
         Ok(EpisodeResult {
             seed,
             solved,

@@ -27,9 +27,12 @@ use acm_runtime::{
 use delta::Deltas;
 pub use frames::FrameDetail;
 use serde::Serialize;
-use std::sync::{
-    Arc, Mutex, PoisonError,
-    atomic::{AtomicU64, Ordering},
+use std::{
+    sync::{
+        Arc, Mutex, PoisonError,
+        atomic::{AtomicU64, Ordering},
+    },
+    time::{Duration, Instant},
 };
 use viewer::Viewer;
 
@@ -59,6 +62,8 @@ pub struct Trace {
     seq: AtomicU64,
     time_ns: AtomicU64,
     deltas: Mutex<Deltas>,
+    /// Wall time that writing took so far, nanoseconds.
+    spent_ns: AtomicU64,
 }
 
 impl Trace {
@@ -78,12 +83,27 @@ impl Trace {
             seq: AtomicU64::new(0),
             time_ns: AtomicU64::new(0),
             deltas: Mutex::default(),
+            spent_ns: AtomicU64::new(0),
         })
     }
 
     /// The file.
     pub fn writer(&self) -> &TraceWriter {
         &self.writer
+    }
+
+    /// Wall time that all writing took so far: what the trace costs.
+    pub fn spent(&self) -> Duration {
+        Duration::from_nanos(self.spent_ns.load(Ordering::Relaxed))
+    }
+
+    /// Counts the time that some work takes.
+    fn counted<T>(&self, work: impl FnOnce() -> T) -> T {
+        #[allow(clippy::disallowed_methods, reason = "goes to the report of costs, never to a core or into the file")]
+        let began = Instant::now();
+        let done = work();
+        self.spent_ns.fetch_add(began.elapsed().as_nanos() as u64, Ordering::Relaxed);
+        done
     }
 
     /// Writes down what the agent is told before it begins, and takes note of what memory believes already.
@@ -114,26 +134,30 @@ impl Trace {
 
 impl Journal<Message> for Trace {
     fn record(&self, message: &Envelope<Message>) -> Result<(), JournalError> {
-        self.seq.store(message.seq, Ordering::Relaxed);
-        self.time_ns.store(message.time_ns, Ordering::Relaxed);
-        self.viewer.message(&self.writer, message)?;
-        self.draw(message)?;
-        // Last, since it hands what was written to the operating system.
-        self.journal.record(message)
+        self.counted(|| {
+            self.seq.store(message.seq, Ordering::Relaxed);
+            self.time_ns.store(message.time_ns, Ordering::Relaxed);
+            self.viewer.message(&self.writer, message)?;
+            self.draw(message)?;
+            // Last, since it hands what was written to the operating system.
+            self.journal.record(message)
+        })
     }
     fn handled(&self, handled: &Handled) -> Result<(), JournalError> {
-        Journal::<Message>::handled(&self.journal, handled)
+        self.counted(|| Journal::<Message>::handled(&self.journal, handled))
     }
 }
 
 impl MemoryObserver for Trace {
     fn changed(&self, memory: &dyn Memory) -> Result<(), JournalError> {
-        let (seq, time_ns) = (self.seq.load(Ordering::Relaxed), self.time_ns.load(Ordering::Relaxed));
-        let deltas = self.deltas.lock().unwrap_or_else(PoisonError::into_inner).take(seq, memory);
-        for delta in deltas {
-            self.writer.put(self.changes, seq, time_ns, &json(&delta)?)?;
-        }
-        Ok(())
+        self.counted(|| {
+            let (seq, time_ns) = (self.seq.load(Ordering::Relaxed), self.time_ns.load(Ordering::Relaxed));
+            let deltas = self.deltas.lock().unwrap_or_else(PoisonError::into_inner).take(seq, memory);
+            for delta in deltas {
+                self.writer.put(self.changes, seq, time_ns, &json(&delta)?)?;
+            }
+            Ok(())
+        })
     }
 }
 

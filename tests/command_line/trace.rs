@@ -202,3 +202,27 @@ fn another_programs_reader_finds_the_same_messages() {
     assert!(read["thumbnails"].as_array().unwrap().iter().all(|size| *size == serde_json::json!([160, 120])));
     assert_eq!(read["lines"], ours["messages"].as_array().unwrap().len());
 }
+
+#[test]
+fn the_bench_of_the_runtime_measures_every_figure_that_has_a_target() {
+    let dir = tempfile::tempdir().unwrap();
+    let (path, targets) = (dir.path().join("runtime.json"), dir.path().join("targets.toml"));
+    // Targets that nothing can miss: the speed of this machine is not what is tested.
+    fs::write(&targets, "[runtime]\nactor_restart_ms = { min = 0 }\n").unwrap();
+    let bench = |extra: &[&str]| {
+        let arguments = ["bench", "runtime", "--quick", "--episodes", "1", "--against", targets.to_str().unwrap()];
+        acm().args(arguments).args(extra).output().unwrap()
+    };
+    let output = bench(&["--json", path.to_str().unwrap()]);
+    let printed = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert_eq!(output.status.code(), Some(0), "{printed} {}", String::from_utf8_lossy(&output.stderr));
+    assert!(printed.contains("What iceoryx2 buys") && printed.contains("What it does not buy"), "{printed}");
+    let result: serde_json::Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
+    assert_eq!((&result["schema"], &result["bench"]), (&"acm.bench/1".into(), &"runtime".into()));
+    let own: toml::Table = include_str!("../../agent/figures.toml").parse().unwrap();
+    for name in own["runtime"].as_table().unwrap().keys() {
+        assert!(result["figures"][name].is_number(), "no figure {name} in {}", result["figures"]);
+    }
+    fs::write(&targets, "[runtime]\nactor_restart_ms = 3\n").unwrap();
+    assert_eq!(bench(&[]).status.code(), Some(2));
+}

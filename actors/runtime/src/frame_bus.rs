@@ -9,7 +9,9 @@ mod shared_memory;
 mod tests;
 
 pub use in_process::InProcessBus;
-pub use shared_memory::{BusError, BusLimits, SharedMemoryBus, SharedMemoryReader, SharedMemoryWriter, run_id};
+pub use shared_memory::{
+    BusError, BusLimits, PreparedFrame, SharedMemoryBus, SharedMemoryReader, SharedMemoryWriter, run_id,
+};
 
 use bytes::Bytes;
 use std::sync::Arc;

@@ -101,7 +101,8 @@ impl CameraSource for TracedCamera {
     fn capture(&mut self, camera: &str) -> Result<RgbdFrame, CameraError> {
         let frame = self.cameras.capture(camera)?;
         // A frame that cannot be written down is not handed on: the run could not be looked at afterwards.
-        let written = self.write(&frame);
+        let trace = Arc::clone(&self.trace);
+        let written = trace.counted(|| self.write(&frame));
         written.map_err(|e| CameraError::Failed { name: camera.into(), reason: e.to_string() })?;
         Ok(frame)
     }
