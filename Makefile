@@ -12,7 +12,7 @@ setup:
 	@scripts/setup.sh
 
 demo: setup
-	@$(cargo) build --release --locked
+	@ACM_COMMIT=$$(git rev-parse --short=12 HEAD 2>/dev/null || echo unknown) $(cargo) build --release --locked
 	@$(target)/release/acm demo
 
 # Built first and run then: while tests run their own output must come through untouched.

@@ -1,10 +1,11 @@
 //! The command line and its exit codes.
 
-use crate::{demo, doctor, inject::Injection, perceive, run, scenario, serve};
+use crate::{bench, demo, doctor, inject::Injection, perceive, run, scenario, serve, trace};
 use acm_actors::{
     AgentError,
     episode::Until,
     remote::{Address, FrameMode},
+    trace::FrameDetail,
 };
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::{path::PathBuf, process::ExitCode, str::FromStr};
@@ -67,6 +68,15 @@ pub enum Command {
     /// Run the simulator in a process of its own.
     #[command(subcommand)]
     Sim(SimCommand),
+    /// Look into the traces that `acm run --trace` writes.
+    #[command(subcommand)]
+    Trace(TraceCommand),
+    /// Measure figures and print them beside what they are to reach.
+    #[command(subcommand)]
+    Bench(BenchCommand),
+    /// The other process of a bench: takes frames and says when.
+    #[command(hide = true)]
+    BenchReader(BenchReaderArgs),
     /// Say what this machine has of what ACM needs.
     Doctor,
 }
@@ -161,6 +171,16 @@ pub struct RunArgs {
     /// Another sensor profile than the scenario's: none, d435, d435-hard.
     #[arg(long, value_name = "PROFILE")]
     pub sensor: Option<String>,
+    /// Write every message, effect and change of memory into this MCAP file. Of a range, or in a folder, each run has
+    /// a file of its own.
+    #[arg(long, value_name = "FILE")]
+    pub trace: Option<PathBuf>,
+    /// What the trace keeps of each frame beside its hash: full, thumbnail or hash.
+    #[arg(long, value_name = "DETAIL", default_value = "thumbnail")]
+    pub trace_frames: FrameDetail,
+    /// Draw the episode into this GIF: what is seen, what is remembered, what is planned. One seed only.
+    #[arg(long, value_name = "FILE.gif")]
+    pub video: Option<PathBuf>,
     /// Print the results as JSON instead of text.
     #[arg(long)]
     pub json: bool,
@@ -274,6 +294,84 @@ pub fn exit_of_error(error: &anyhow::Error) -> Exit {
     }
 }
 
+/// The verbs of `acm trace`.
+#[derive(Debug, Subcommand)]
+pub enum TraceCommand {
+    /// One line for each run in a folder: what was run, and how it ended.
+    Ls(TraceLsArgs),
+    /// The messages of a run as a table; or one step's decision; or one message in full.
+    Show(TraceShowArgs),
+}
+
+/// Arguments of `acm trace ls`.
+#[derive(Debug, Args)]
+pub struct TraceLsArgs {
+    /// A folder with traces, or one trace.
+    #[arg(default_value = ".")]
+    pub path: PathBuf,
+    /// Print JSON instead of text.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `acm trace show`.
+#[derive(Debug, Args)]
+pub struct TraceShowArgs {
+    /// The trace.
+    pub file: PathBuf,
+    /// The decision behind the Nth skill that was run: candidates, preconditions, prediction, verdict.
+    #[arg(long, value_name = "N", conflicts_with_all = ["seq", "json"])]
+    pub step: Option<usize>,
+    /// The message of this number, in full.
+    #[arg(long, value_name = "N")]
+    pub seq: Option<u64>,
+    /// Only messages from or to this actor.
+    #[arg(long, value_name = "A")]
+    pub actor: Option<String>,
+    /// Only messages of this kind.
+    #[arg(long, value_name = "K")]
+    pub kind: Option<String>,
+    /// Only messages whose line or body has this word, small or capital.
+    #[arg(long, value_name = "WORD")]
+    pub text: Option<String>,
+    /// Print JSON instead of text: the messages in full.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// The benches.
+#[derive(Debug, Subcommand)]
+pub enum BenchCommand {
+    /// Frames between processes, messages between actors, what a trace costs, how fast an actor is replaced.
+    Runtime(BenchArgs),
+}
+
+/// Arguments of every bench.
+#[derive(Debug, Args)]
+pub struct BenchArgs {
+    /// Most episodes or frames; all that there are if not given.
+    #[arg(long, value_name = "N")]
+    pub episodes: Option<usize>,
+    /// A tenth of the repetitions: to see that it works, not to compare.
+    #[arg(long)]
+    pub quick: bool,
+    /// Write the result, with all rows, into this file.
+    #[arg(long, value_name = "FILE")]
+    pub json: Option<PathBuf>,
+    /// Compare with the targets of this file instead of the built-in ones.
+    #[arg(long, value_name = "FILE")]
+    pub against: Option<PathBuf>,
+}
+
+/// Arguments of the other process of a bench.
+#[derive(Debug, Args)]
+pub struct BenchReaderArgs {
+    /// `bus` or `socket`.
+    pub way: String,
+    /// Name of the bus, or path of the socket.
+    pub name: String,
+}
+
 /// Performs a command.
 pub fn run(cli: Cli) -> anyhow::Result<Exit> {
     match cli.command {
@@ -282,6 +380,9 @@ pub fn run(cli: Cli) -> anyhow::Result<Exit> {
         Command::Perceive(args) => perceive::run(&args),
         Command::Scenario(command) => scenario::run(&command),
         Command::Sim(SimCommand::Serve(args)) => serve::run(&args),
+        Command::Trace(command) => trace::run(&command),
+        Command::Bench(command) => bench::run(&command),
+        Command::BenchReader(args) => bench::runtime::peer::run(&args),
         Command::Doctor => doctor::run(),
     }
 }

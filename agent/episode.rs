@@ -1,6 +1,9 @@
 //! One episode: simulator, agent, judge.
 
-use crate::inject::{Faults, FrameTap};
+use crate::{
+    inject::{Faults, FrameTap},
+    trace::recording::{Recording, TraceRequest},
+};
 use acm_actors::{
     Agent,
     agent::Interrupt,
@@ -9,6 +12,7 @@ use acm_actors::{
     message::Message,
     remote::{HostVerdict, RemoteRobot},
     report::{Ending, EpisodeReport},
+    trace::Trace,
 };
 use acm_concept::{
     embodiment::{Command, Embodiment, EmbodimentError, Feedback, RobotDescription},
@@ -49,6 +53,8 @@ pub struct EpisodeConfig {
     pub sensor: Option<String>,
     /// Keeps frames on their way to the agent.
     pub frames: Option<FrameTap>,
+    /// Where all of the run is written down.
+    pub trace: Option<TraceRequest>,
     /// For tests: the actor of this name panics at its nth message.
     pub panic_at: Option<(String, u64)>,
     /// The event at which the run ends.
@@ -147,6 +153,22 @@ impl Runner {
         config: &EpisodeConfig,
         journal: Arc<dyn Journal<Message>>,
     ) -> anyhow::Result<EpisodeResult> {
+        let Some(request) = &config.trace else { return self.episode(scenario, seed, config, journal, None) };
+        let recording = Recording::begin(request, scenario, seed, config, &self.adapter())?;
+        let result = self.episode(scenario, seed, config, journal, Some(recording.trace()));
+        let finished = recording.end(&result);
+        // What went wrong first is what is told.
+        result.and_then(|result| finished.map(|()| result))
+    }
+
+    fn episode(
+        &self,
+        scenario: &Scenario,
+        seed: u64,
+        config: &EpisodeConfig,
+        journal: Arc<dyn Journal<Message>>,
+        trace: Option<Arc<Trace>>,
+    ) -> anyhow::Result<EpisodeResult> {
         let options = SimOptions {
             seed,
             slip_at: config.faults.slip_at,
@@ -160,7 +182,7 @@ impl Runner {
         let built_s = started.elapsed().as_secs_f64();
         let outside =
             Outside { embodiment: simulation.embodiment(), cameras: simulation.camera(), clock: simulation.clock() };
-        let mut lived = self.live(simulation.task(), outside, seed, config, journal)?;
+        let mut lived = self.live(simulation.task(), outside, seed, config, journal, trace)?;
         split_host_time(&mut lived.spent_s, &simulation.timings());
         lived.spent_s.insert("world-building".into(), built_s);
         let judged = !matches!(lived.report.ending, Ending::Until { .. });
@@ -178,7 +200,7 @@ impl Runner {
     ) -> anyhow::Result<EpisodeResult> {
         let started = now();
         let outside = Outside { embodiment: robot.embodiment(), cameras: robot.camera(), clock: robot.clock() };
-        let mut lived = self.live(robot.task().clone(), outside, seed, config, journal)?;
+        let mut lived = self.live(robot.task().clone(), outside, seed, config, journal, None)?;
         let verdict = match &lived.report.ending {
             // Nobody has done anything yet that could be judged, and a lost host judges nothing.
             Ending::Until { .. } | Ending::Broken { .. } => Ok(None),
@@ -199,6 +221,7 @@ impl Runner {
         seed: u64,
         config: &EpisodeConfig,
         journal: Arc<dyn Journal<Message>>,
+        trace: Option<Arc<Trace>>,
     ) -> anyhow::Result<Lived> {
         let memory = acm_baselines::by_name(&config.method, Arc::clone(&self.library), config.memory.as_deref())?;
         let panic_at = config.panic_at.as_ref().or(config.faults.panic_at.as_ref());
@@ -208,6 +231,7 @@ impl Runner {
             .wipe_at(config.faults.wipe_at.clone())
             .until(config.until)
             .journal(journal)
+            .trace(trace.clone())
             .panic_at(panic_at.and_then(|(name, message)| role(name).map(|role| PanicAt { role, message: *message })))
             .build()?;
         if let Some(instruction) = &config.instruction {
@@ -221,11 +245,12 @@ impl Runner {
             cameras = tap.cameras(cameras);
         }
         let run = self.runtime.block_on(agent.run(task, robot, cameras, outside.clock, &self.interrupt))?;
-        Ok(Lived {
-            report: run.report,
-            spent_s: run.spent.iter().map(|(role, time)| (role.to_string(), time.as_secs_f64())).collect(),
-            commands: commands.load(Ordering::Relaxed),
-        })
+        let mut spent_s: BTreeMap<String, f64> =
+            run.spent.iter().map(|(role, time)| (role.to_string(), time.as_secs_f64())).collect();
+        if let Some(trace) = trace {
+            spent_s.insert("trace".into(), trace.spent().as_secs_f64());
+        }
+        Ok(Lived { report: run.report, spent_s, commands: commands.load(Ordering::Relaxed) })
     }
 }
 

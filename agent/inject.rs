@@ -93,17 +93,22 @@ impl Faults {
     }
 }
 
-/// Keeps the first frames that pass, for pictures.
+/// Keeps the first or the last frames that pass, for pictures.
 #[derive(Debug, Clone)]
 pub struct FrameTap {
     limit: usize,
+    newest: bool,
     frames: Arc<Mutex<Vec<RgbdFrame>>>,
 }
 
 impl FrameTap {
-    /// Keeps at most `limit` frames.
+    /// Keeps the first `limit` frames.
     pub fn first(limit: usize) -> FrameTap {
-        FrameTap { limit, frames: Arc::default() }
+        FrameTap { limit, newest: false, frames: Arc::default() }
+    }
+    /// Keeps the last frame.
+    pub fn last() -> FrameTap {
+        FrameTap { limit: 1, newest: true, frames: Arc::default() }
     }
     /// The frames so far.
     pub fn frames(&self) -> Vec<RgbdFrame> {
@@ -127,6 +132,9 @@ impl CameraSource for TappedCamera {
     fn capture(&mut self, camera: &str) -> Result<RgbdFrame, CameraError> {
         let frame = self.cameras.capture(camera)?;
         let mut frames = self.tap.frames.lock().unwrap_or_else(PoisonError::into_inner);
+        if self.tap.newest {
+            frames.clear();
+        }
         if frames.len() < self.tap.limit {
             frames.push(frame.clone());
         }

@@ -11,9 +11,13 @@
 //! | [`narrate`] | the story of an episode, told from its messages |
 //! | [`demo`] | `acm demo`: the first minute |
 //! | [`perceive`] | `acm perceive`: real frames, no simulator |
+//! | [`bench`](mod@bench) | `acm bench`: figures beside what they are to reach |
 //! | [`scenario`], [`doctor`] | `acm scenario`, `acm doctor` |
+//! | [`trace`] | `acm trace`: a run written down, and looked into |
+//! | [`video`] | `acm run --video`: an episode as moving pictures |
 //! | [`statistics`] | proportions with intervals |
 
+pub mod bench;
 pub mod cli;
 pub mod demo;
 pub mod doctor;
@@ -26,3 +30,5 @@ pub mod run;
 pub mod scenario;
 pub mod serve;
 pub mod statistics;
+pub mod trace;
+pub mod video;

@@ -7,10 +7,12 @@ use crate::{
     narrate::Narrator,
     remote,
     statistics::{median_and, wilson95},
+    trace::recording::TraceRequest,
+    video::{Camera, VideoFile},
 };
-use acm_actors::{episode::Until, report::Ending};
+use acm_actors::{message::Message, report::Ending};
 use acm_concept::template::TemplateLibrary;
-use acm_runtime::journal::NoJournal;
+use acm_runtime::journal::{Both, Journal, NoJournal};
 use acm_sim::Scenario;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
@@ -24,11 +26,12 @@ use std::{
 pub fn run(args: &RunArgs) -> anyhow::Result<Exit> {
     let Some(scenario) = &args.scenario else { return remote::run(args) };
     let scenario = Scenario::open(scenario)?;
+    let video = args.video.as_deref().map(|path| VideoFile::create(path, args.seed.range)).transpose()?;
     let (config, library) = prepare(args)?;
     let runner = Runner::with_library(library)?;
     runner.end_on_ctrl_c();
     match args.seed.range {
-        false => one(&runner, &scenario, args, &config),
+        false => one(&runner, &scenario, args, &config, video),
         true => many(&runner, &scenario, args, &config),
     }
 }
@@ -55,14 +58,29 @@ pub(crate) fn prepare(args: &RunArgs) -> anyhow::Result<(EpisodeConfig, Template
     Ok((config, library))
 }
 
-fn one(runner: &Runner, scenario: &Scenario, args: &RunArgs, config: &EpisodeConfig) -> anyhow::Result<Exit> {
-    let result = if args.json {
-        runner.run(scenario, args.seed.first, config, Arc::new(NoJournal))?
+fn one(
+    runner: &Runner,
+    scenario: &Scenario,
+    args: &RunArgs,
+    config: &EpisodeConfig,
+    video: Option<VideoFile>,
+) -> anyhow::Result<Exit> {
+    let mut config = traced(scenario, args, config, args.seed.first);
+    let mut journal: Arc<dyn Journal<Message>> = if args.json {
+        Arc::new(NoJournal)
     } else {
         println!("{} seed {}: {}", scenario.name(), args.seed.first, scenario.summary());
-        let narrator = Arc::new(Narrator::new(Box::new(std::io::stdout())));
-        runner.run(scenario, args.seed.first, config, narrator)?
+        Arc::new(Narrator::new(Box::new(std::io::stdout())))
     };
+    let camera = Arc::new(Camera::new(Arc::clone(runner.library())));
+    if video.is_some() {
+        config.frames = Some(camera.tap());
+        journal = Arc::new(Both(journal, Arc::clone(&camera) as Arc<dyn Journal<Message>>));
+    }
+    let result = runner.run(scenario, args.seed.first, &config, journal)?;
+    if let Some(video) = video {
+        video.write(&camera.pictures(ending_of(&result)))?;
+    }
     tell_result(&Source::of(scenario, args), args, &result)?;
     Ok(exit_of(&result))
 }
@@ -84,7 +102,7 @@ fn many(runner: &Runner, scenario: &Scenario, args: &RunArgs, config: &EpisodeCo
     let bar = progress(count, args.json);
     let mut results = Vec::new();
     for seed in args.seed.first..=args.seed.last {
-        let result = runner.run(scenario, seed, config, Arc::new(NoJournal))?;
+        let result = runner.run(scenario, seed, &traced(scenario, args, config, seed), Arc::new(NoJournal))?;
         tell(&bar, args.json, &line(&result))?;
         bar.inc(1);
         let interrupted = result.report.ending == Ending::Interrupted;
@@ -107,6 +125,13 @@ fn many(runner: &Runner, scenario: &Scenario, args: &RunArgs, config: &EpisodeCo
     Ok(exit_of_range(&results, count as usize))
 }
 
+/// The configuration of one seed: its trace is a file of its own.
+fn traced(scenario: &Scenario, args: &RunArgs, config: &EpisodeConfig, seed: u64) -> EpisodeConfig {
+    let request =
+        |target| TraceRequest::for_seed(target, args.trace_frames, config, scenario.name(), seed, args.seed.range);
+    EpisodeConfig { trace: args.trace.as_deref().map(request), ..config.clone() }
+}
+
 /// One line an episode: above the bar on a terminal, on standard output elsewhere; none with JSON.
 fn tell(bar: &ProgressBar, json: bool, line: &str) -> anyhow::Result<()> {
     if json {
@@ -126,6 +151,12 @@ fn progress(count: u64, hidden: bool) -> ProgressBar {
         Ok(style) => bar.with_style(style),
         Err(_template) => bar,
     }
+}
+
+/// The last line of a video: how it ended, and what the judge says.
+fn ending_of(result: &EpisodeResult) -> String {
+    let judge = if result.verdict.strict { "success" } else { "no success" };
+    format!("{} (judge: {judge})", result.report.ending)
 }
 
 /// The exit of one episode.
@@ -155,16 +186,7 @@ fn exit_of_range(results: &[EpisodeResult], asked: usize) -> Exit {
 
 /// How an episode ended, in words.
 pub fn ending_words(ending: &Ending) -> String {
-    match ending {
-        Ending::Done => "done".into(),
-        Ending::GaveUp { unknown, .. } => format!("gave up: {unknown}"),
-        Ending::NotUnderstood { reason } => format!("not understood: {reason}"),
-        Ending::Until { event: Until::Instruction } => {
-            "the instruction would be given now, and the run ends here as asked".into()
-        }
-        Ending::Interrupted => "interrupted".into(),
-        Ending::Broken { reason } => format!("broken: {reason}"),
-    }
+    ending.to_string()
 }
 
 fn line(result: &EpisodeResult) -> String {

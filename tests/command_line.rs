@@ -1,6 +1,9 @@
 //! The real binary on bad input: one clear line and exit code 2, nothing lost.
 #![allow(clippy::unwrap_used, clippy::expect_used)] // a failed unwrap is the test's verdict
 
+#[path = "command_line/trace.rs"]
+mod trace;
+
 use assert_cmd::Command;
 use std::{fs, path::Path};
 

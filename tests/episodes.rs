@@ -4,11 +4,18 @@
 use acm::{
     episode::{EpisodeConfig, EpisodeResult, Runner},
     inject::{Faults, Injection},
+    trace::recording::TraceRequest,
 };
-use acm_actors::{message::Message, report::Ending};
-use acm_runtime::journal::{Journal, MemoryJournal, NoJournal};
+use acm_actors::{message::Message, report::Ending, trace::FrameDetail};
+use acm_runtime::{
+    journal::{Journal, MemoryJournal, NoJournal},
+    trace::{Item, TraceReader},
+};
 use acm_sim::Scenario;
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::{
+    path::Path,
+    sync::{Arc, Mutex, OnceLock, PoisonError},
+};
 
 /// One renderer for all tests of this binary: it takes a second to start, and software drivers dislike several.
 fn with_runner<T>(test: impl FnOnce(&Runner) -> T) -> T {
@@ -91,6 +98,53 @@ fn two_runs_write_equal_journals() {
     }
     let [first, second] = journals.map(|journal| journal.entries());
     assert!(first.iter().filter(|entry| entry.kind == "command").count() > 100);
+    assert_eq!(first, second);
+}
+
+/// What two runs have in common: topic, virtual time and bytes of all but the wall clock's messages, in order.
+fn told(trace: &Path) -> Vec<(String, u64, Vec<u8>)> {
+    let mut reader = TraceReader::open(trace).unwrap();
+    let mut told = Vec::new();
+    while let Some(item) = reader.next_item() {
+        match item {
+            Item::Message(message) if message.topic() != "/wall" => {
+                told.push((message.topic().to_owned(), message.time_ns, message.data))
+            }
+            _ => {}
+        }
+    }
+    assert_eq!(reader.cut(), None);
+    told
+}
+
+#[test]
+fn a_trace_changes_nothing_and_two_traces_of_one_seed_are_equal() {
+    let dir = tempfile::tempdir().unwrap();
+    let paths = ["1.mcap", "2.mcap"].map(|name| dir.path().join(name));
+    let requests = paths.clone().map(|path| Some(TraceRequest { path, frames: FrameDetail::Thumbnail }));
+    let run = |trace: Option<TraceRequest>| {
+        let journal = MemoryJournal::default();
+        run_into("put-back-block", 11, &["slip@1"], Arc::new(journal.clone()), |config| config.trace = trace);
+        journal.entries()
+    };
+    let untraced = run(None);
+    let [first, second] = requests.map(run);
+    assert!(untraced.len() > 500);
+    assert_eq!(untraced, first);
+    assert_eq!(untraced, second);
+    let [first, second] = paths.map(|path| told(&path));
+    // Every message of the journal is in the trace, in its order, with its body.
+    let is_message = |topic: &str| untraced.iter().any(|entry| topic == format!("/{}/{}", entry.to, entry.kind));
+    let messages: Vec<_> = first.iter().filter(|(topic, ..)| is_message(topic)).collect();
+    assert_eq!(messages.len(), untraced.len());
+    for ((topic, time_ns, bytes), entry) in messages.iter().zip(&untraced) {
+        assert_eq!((topic.as_str(), *time_ns), (format!("/{}/{}", entry.to, entry.kind).as_str(), entry.time_ns));
+        assert!(bytes.ends_with(&[&entry.body[..], b"}"].concat()), "{topic}");
+    }
+    assert!(
+        first.iter().any(|(topic, ..)| topic == "/effect/frame")
+            && first.iter().any(|(topic, ..)| topic == "/memory/delta")
+    );
     assert_eq!(first, second);
 }
 

@@ -4,11 +4,12 @@ use crate::{
     episode::{Episode, Until, WipeAt},
     executor::ExecutorActor,
     host::{HostPort, Outside},
-    memory::MemoryActor,
+    memory::{MemoryActor, MemoryObserver},
     message::{EPISODE, EXECUTOR, HOST, MEMORY, Message, PERCEPTION, PLANNER, VERIFIER},
     perception::PerceptionActor,
     planner::PlannerActor,
     report::EpisodeReport,
+    trace::Trace,
     verifier::VerifierActor,
 };
 use acm_concept::{
@@ -23,7 +24,7 @@ use acm_planner::{PlanOptions, Planner};
 use acm_runtime::{
     envelope::Role,
     frame_bus::{FrameBus, InProcessBus},
-    journal::{Journal, NoJournal},
+    journal::{Both, Journal, JournalError, NoJournal},
     system::{PanicAt, SystemBuilder, SystemError},
 };
 use std::{
@@ -50,6 +51,9 @@ pub enum AgentError {
     /// The actors could not be started or gave no result.
     #[error(transparent)]
     System(#[from] SystemError),
+    /// The trace could not be begun.
+    #[error(transparent)]
+    Trace(#[from] JournalError),
 }
 
 /// What an agent is made of. Everything has a default but the world and the memory.
@@ -60,6 +64,7 @@ pub struct AgentBuilder {
     seed: u64,
     grounder: GrounderConfig,
     journal: Arc<dyn Journal<Message>>,
+    trace: Option<Arc<Trace>>,
     wipe_at: Option<WipeAt>,
     until: Option<Until>,
     panic_at: Option<PanicAt>,
@@ -84,6 +89,11 @@ impl AgentBuilder {
     /// Where messages are written before they are handled.
     pub fn journal(mut self, journal: Arc<dyn Journal<Message>>) -> Self {
         self.journal = journal;
+        self
+    }
+    /// Writes all of a run into a trace: messages, frames, changes of memory. One run for one trace.
+    pub fn trace(mut self, trace: Option<Arc<Trace>>) -> Self {
+        self.trace = trace;
         self
     }
     /// Wipes memory at an event, as a fault for tests.
@@ -144,6 +154,7 @@ impl Agent {
             seed: 0,
             grounder: GrounderConfig::default(),
             journal: Arc::new(NoJournal),
+            trace: None,
             wipe_at: None,
             until: None,
             panic_at: None,
@@ -166,6 +177,14 @@ impl Agent {
     ) -> Result<EpisodeRun, AgentError> {
         let camera = task.cameras.first().ok_or(AgentError::NoCamera)?.name.clone();
         let began = clock.now().0;
+        let cameras = match &self.parts.trace {
+            Some(trace) => {
+                let memory = self.parts.memory.lock().unwrap_or_else(PoisonError::into_inner);
+                trace.begin(&task, embodiment.description(), &**memory)?;
+                trace.cameras(cameras)
+            }
+            None => cameras,
+        };
         let outside = Arc::new(Mutex::new(Outside { embodiment, cameras, clock }));
         let robot = Arc::clone(&outside);
         let mut system = self.system(task, camera, outside).starts_at(began).start().await?;
@@ -200,7 +219,12 @@ impl Agent {
         let (planner, library) = (Arc::clone(&self.planner), Arc::clone(&parts.library));
         let (frames, seen, kept) = (Arc::clone(&bus), Arc::clone(&bus), bus);
         let (eyes, hands, plans) = (robot.clone(), robot.clone(), robot);
-        SystemBuilder::new(1, Arc::clone(&parts.journal))
+        let journal: Arc<dyn Journal<Message>> = match &parts.trace {
+            Some(trace) => Arc::new(Both(Arc::clone(trace) as Arc<dyn Journal<Message>>, Arc::clone(&parts.journal))),
+            None => Arc::clone(&parts.journal),
+        };
+        let observer = parts.trace.clone().map(|trace| trace as Arc<dyn MemoryObserver>);
+        SystemBuilder::new(1, journal)
             .actor(EPISODE, Box::new(move || Box::new(Episode::new(task.clone(), wipe_at.clone()).until(until))))
             .actor(
                 HOST,
@@ -212,7 +236,13 @@ impl Agent {
                     Box::new(PerceptionActor::new(Arc::clone(&grounder), eyes.clone(), Arc::clone(&seen)))
                 }),
             )
-            .actor(MEMORY, Box::new(move || Box::new(MemoryActor::new(Weak::clone(&memory), Arc::clone(&kept)))))
+            .actor(
+                MEMORY,
+                Box::new(move || {
+                    let actor = MemoryActor::new(Weak::clone(&memory), Arc::clone(&kept));
+                    Box::new(actor.observed_by(observer.clone()))
+                }),
+            )
             .actor(
                 PLANNER,
                 Box::new(move || {

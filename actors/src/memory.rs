@@ -7,20 +7,32 @@ use acm_runtime::{
     core::{Core, CoreError, Outbox},
     envelope::Envelope,
     frame_bus::FrameBus,
+    journal::JournalError,
 };
 use std::sync::{Arc, Mutex, PoisonError, Weak};
+
+/// Is told after each call that may have changed memory.
+pub trait MemoryObserver: Send + Sync {
+    /// Looks at what changed. An error ends the episode: what happened could not be written down.
+    fn changed(&self, memory: &dyn Memory) -> Result<(), JournalError>;
+}
 
 /// The memory actor. The memory itself outlives the actor: after a restart the new one goes on with the same store.
 /// It belongs to the agent alone, so that with the agent it is closed at once, and not when the last actor is gone.
 pub struct MemoryActor {
     memory: Weak<Mutex<Box<dyn Memory>>>,
     bus: Arc<dyn FrameBus<RgbdFrame>>,
+    observer: Option<Arc<dyn MemoryObserver>>,
 }
 
 impl MemoryActor {
     /// An actor that writes `memory` and finds the frames behind percepts on `bus`.
     pub fn new(memory: Weak<Mutex<Box<dyn Memory>>>, bus: Arc<dyn FrameBus<RgbdFrame>>) -> MemoryActor {
-        MemoryActor { memory, bus }
+        MemoryActor { memory, bus, observer: None }
+    }
+    /// Tells `observer` of every change.
+    pub fn observed_by(self, observer: Option<Arc<dyn MemoryObserver>>) -> MemoryActor {
+        MemoryActor { observer, ..self }
     }
 }
 
@@ -52,6 +64,11 @@ impl Core<Message> for MemoryActor {
             }
             other => return Err(CoreError(format!("memory cannot handle {other:?}"))),
         };
+        let seen = self.observer.as_ref().map_or(Ok(()), |observer| observer.changed(&**memory));
+        if let Err(error) = seen {
+            outbox.send(EPISODE, Message::Broken { reason: error.to_string() });
+            return Ok(());
+        }
         // A store that cannot be written ends the episode: going on would act on what is not kept.
         outbox.send(EPISODE, kept.unwrap_or_else(|error| Message::Broken { reason: error.to_string() }));
         Ok(())

@@ -79,9 +79,10 @@ impl<'a> ObjectLine<'a> {
     }
 }
 
-/// A message body. Each variant's doc names sender and receiver.
+/// A message body. Each variant's doc names sender and receiver. It is written down without its kind, which stands
+/// beside it in every journal.
 #[derive(Debug, Clone, Serialize)]
-#[serde(rename_all = "kebab-case", tag = "kind", content = "body")]
+#[serde(untagged)]
 pub enum Message {
     /// outside -> episode: begin.
     Begin,
@@ -279,5 +280,8 @@ impl Payload for Message {
     }
     fn to_json(&self) -> Result<Vec<u8>, serde_json::Error> {
         serde_json::to_vec(self)
+    }
+    fn routine(&self) -> bool {
+        matches!(self, Message::Command(_) | Message::Moved(_))
     }
 }

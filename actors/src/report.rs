@@ -5,6 +5,7 @@ use acm_concept::{ids::ObjectId, skill::FailureCause, time::Time};
 use acm_memory::observation::Outcome;
 use acm_planner::GiveUpCause;
 use serde::Serialize;
+use std::fmt;
 
 /// How an episode ended, from the agent's side. Whether it was right is for the judge to say.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -36,6 +37,21 @@ pub enum Ending {
         /// What.
         reason: String,
     },
+}
+
+impl fmt::Display for Ending {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Ending::Done => f.write_str("done"),
+            Ending::GaveUp { unknown, .. } => write!(f, "gave up: {unknown}"),
+            Ending::NotUnderstood { reason } => write!(f, "not understood: {reason}"),
+            Ending::Until { event: Until::Instruction } => {
+                f.write_str("the instruction would be given now, and the run ends here as asked")
+            }
+            Ending::Interrupted => f.write_str("interrupted"),
+            Ending::Broken { reason } => write!(f, "broken: {reason}"),
+        }
+    }
 }
 
 /// One skill that was run.

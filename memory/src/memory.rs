@@ -8,6 +8,7 @@ use crate::{
     log::Log,
     observation::{Executed, Grounding, Note, Observation, Verdict},
     observe,
+    recent::{Recent, RecentEvents},
     state::State,
     traits::{Memory, MemoryError, MemoryView},
     view::Snapshot,
@@ -33,12 +34,19 @@ pub struct AcmMemory {
     rule: IdentityRule,
     state: State,
     log: Option<Log>,
+    recent: RecentEvents,
 }
 
 impl AcmMemory {
     /// A memory that ends with the process.
     pub fn in_memory(library: Arc<TemplateLibrary>) -> AcmMemory {
-        AcmMemory { library, rule: IdentityRule::Global, state: State::default(), log: None }
+        AcmMemory {
+            library,
+            rule: IdentityRule::Global,
+            state: State::default(),
+            log: None,
+            recent: RecentEvents::default(),
+        }
     }
     /// Creates a memory folder or continues the one that is there. What a crash left unacknowledged is cut off.
     pub fn open(dir: &Path, library: Arc<TemplateLibrary>) -> Result<AcmMemory, MemoryError> {
@@ -51,7 +59,7 @@ impl AcmMemory {
                 reason,
             })?;
         }
-        Ok(AcmMemory { library, rule: IdentityRule::Global, state, log: Some(log) })
+        Ok(AcmMemory { library, rule: IdentityRule::Global, state, log: Some(log), recent: RecentEvents::default() })
     }
     /// The same memory with another identity rule.
     pub fn with_identity(self, rule: IdentityRule) -> AcmMemory {
@@ -94,6 +102,7 @@ impl AcmMemory {
             log.append(&events)?;
         }
         self.state = state;
+        self.recent.add(events);
         Ok(())
     }
 
@@ -191,9 +200,13 @@ impl Memory for AcmMemory {
             log.replace(&events)?;
         }
         self.state = state;
+        self.recent.add(events);
         Ok(())
     }
     fn view(&self) -> Arc<dyn MemoryView> {
         Arc::new(self.snapshot())
+    }
+    fn events_since(&self, known: u64) -> Recent {
+        self.recent.since(known)
     }
 }

@@ -4,6 +4,7 @@ use crate::{
     entry::{ObjectEntry, SkillEntry, TaskProgress, Transition},
     observation::{Executed, Grounding, Note, Observation, Verdict},
     query::{Applicability, ObjectQuery, PlaceReference, Prediction, Recall, Retrieval, SkillCandidate},
+    recent::Recent,
 };
 use acm_concept::{
     expectation::Expectation,
@@ -78,6 +79,11 @@ pub trait Memory: Send {
     fn wipe(&mut self) -> Result<(), MemoryError>;
     /// An immutable view of the present state; cheap to take.
     fn view(&self) -> Arc<dyn MemoryView>;
+    /// The events that came after the first `known` ones since this memory was opened: what changed, for whoever
+    /// writes it down. A memory that is no sum of events gives none.
+    fn events_since(&self, _known: u64) -> Recent {
+        Recent::default()
+    }
 }
 
 /// What can be read from a memory. Views do not change while the writer goes on.

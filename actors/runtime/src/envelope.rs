@@ -23,6 +23,11 @@ pub trait Payload: Send + 'static {
     fn kind(&self) -> &'static str;
     /// The body as one JSON document.
     fn to_json(&self) -> Result<Vec<u8>, serde_json::Error>;
+    /// Whether it is one of a long series, such as control ticks. A journal may hold a few of these back in memory;
+    /// all others it hands to the operating system before they are handled.
+    fn routine(&self) -> bool {
+        false
+    }
 }
 
 /// A delivered message.

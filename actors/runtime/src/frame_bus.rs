@@ -10,7 +10,7 @@ mod tests;
 
 pub use in_process::InProcessBus;
 pub use shared_memory::{
-    BusError, BusLimits, SharedMemoryBus, SharedMemoryReader, SharedMemoryWriter, leftovers, run_id,
+    BusError, BusLimits, PreparedFrame, SharedMemoryBus, SharedMemoryReader, SharedMemoryWriter, leftovers, run_id,
 };
 
 pub use bytes::Bytes;

@@ -1,7 +1,10 @@
 //! Where messages are written down before they are handled.
 
 use crate::envelope::{Envelope, Payload, Role};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::{
+    sync::{Arc, Mutex, PoisonError},
+    time::Duration,
+};
 use thiserror::Error;
 
 /// A message that could not be written down.
@@ -9,10 +12,41 @@ use thiserror::Error;
 #[error("the journal cannot be written: {0}")]
 pub struct JournalError(pub String);
 
+/// A message whose handler has returned.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Handled {
+    /// Number of the message.
+    pub seq: u64,
+    /// Who handled it.
+    pub by: Role,
+    /// Virtual time of its sending, nanoseconds.
+    pub time_ns: u64,
+    /// Wall time that its handler took.
+    pub took: Duration,
+}
+
 /// Takes every delivered message before its handler runs, so that the last entry of a crashed run is the culprit.
 pub trait Journal<M>: Send + Sync {
     /// Writes one message down.
     fn record(&self, message: &Envelope<M>) -> Result<(), JournalError>;
+    /// Is told that a message was handled. Wall time differs between equal runs: whoever keeps it keeps it apart.
+    fn handled(&self, _: &Handled) -> Result<(), JournalError> {
+        Ok(())
+    }
+}
+
+/// Writes to two journals, one after the other.
+pub struct Both<M>(pub Arc<dyn Journal<M>>, pub Arc<dyn Journal<M>>);
+
+impl<M: Send> Journal<M> for Both<M> {
+    fn record(&self, message: &Envelope<M>) -> Result<(), JournalError> {
+        self.0.record(message)?;
+        self.1.record(message)
+    }
+    fn handled(&self, handled: &Handled) -> Result<(), JournalError> {
+        self.0.handled(handled)?;
+        self.1.handled(handled)
+    }
 }
 
 /// Writes nothing.

@@ -9,6 +9,7 @@
 //! | [`core`] | the trait of an actor's pure logic, and its outbox |
 //! | [`system`] | shells on ractor: sequencing, write-ahead journal, supervision and restart |
 //! | [`journal`] | where delivered messages are written before they are handled |
+//! | [`trace`] | all of a run in one MCAP file: written, and read back |
 //! | [`frame_bus`] | frames handed over by number instead of by copy, within a process and between processes |
 
 pub mod core;
@@ -16,3 +17,4 @@ pub mod envelope;
 pub mod frame_bus;
 pub mod journal;
 pub mod system;
+pub mod trace;

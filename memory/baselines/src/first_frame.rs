@@ -3,7 +3,7 @@
 use crate::{Reactive, last_frame::LastFrame};
 use acm_concept::{expectation::Expectation, ids::TransitionId, template::TemplateLibrary, time::Time};
 use acm_memory::{
-    Memory, MemoryError, MemoryView,
+    Memory, MemoryError, MemoryView, Recent,
     entry::ObjectEntry,
     observation::{Executed, Grounding, Note, Observation, Verdict},
 };
@@ -58,6 +58,9 @@ impl Memory for FirstFrame {
         // The first frame of a run comes once. What is seen after a wipe is not it.
         (self.first, self.waiting) = (Arc::default(), false);
         Ok(())
+    }
+    fn events_since(&self, known: u64) -> Recent {
+        self.last.events_since(known)
     }
     fn view(&self) -> Arc<dyn MemoryView> {
         Arc::new(LastFrame::new(self.last.snapshot(), Arc::clone(&self.first)))

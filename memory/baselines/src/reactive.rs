@@ -8,7 +8,7 @@ use acm_concept::{
     time::Time,
 };
 use acm_memory::{
-    AcmMemory, Memory, MemoryError, MemoryView, Snapshot,
+    AcmMemory, Memory, MemoryError, MemoryView, Recent, Snapshot,
     event::Forget,
     observation::{Executed, Grounding, Note, Observation, Verdict},
 };
@@ -71,6 +71,9 @@ impl Memory for Reactive {
     }
     fn wipe(&mut self) -> Result<(), MemoryError> {
         self.memory.wipe()
+    }
+    fn events_since(&self, known: u64) -> Recent {
+        self.memory.events_since(known)
     }
     fn view(&self) -> Arc<dyn MemoryView> {
         Arc::new(LastFrame::new(self.snapshot(), Arc::default()))

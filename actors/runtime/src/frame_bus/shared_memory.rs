@@ -9,7 +9,7 @@ mod reader;
 mod writer;
 
 pub use reader::SharedMemoryReader;
-pub use writer::SharedMemoryWriter;
+pub use writer::{PreparedFrame, SharedMemoryWriter};
 
 use super::{ByteFrame, FrameBus, FrameError, FrameReader, PublishError};
 use chunk::FrameTag;

@@ -4,6 +4,7 @@ use super::{PanicAt, Shared};
 use crate::{
     core::{Core, Outbox},
     envelope::{Envelope, Payload, Role},
+    journal::Handled,
 };
 use ractor::{Actor, ActorProcessingErr, ActorRef};
 use std::sync::{Arc, PoisonError};
@@ -34,7 +35,8 @@ impl<M: Payload> Actor for Shell<M> {
     ) -> Result<(), ActorProcessingErr> {
         self.shared.journal.record(&message)?;
         self.panic_if_told();
-        let (seq, mut outbox) = (message.seq, Outbox::new(message.time_ns));
+        let (seq, sent_ns) = (message.seq, message.time_ns);
+        let mut outbox = Outbox::new(sent_ns);
         // The one place where handlers are timed: the figure goes to the report, never to a core.
         #[allow(clippy::disallowed_methods)]
         let started = std::time::Instant::now();
@@ -42,6 +44,7 @@ impl<M: Payload> Actor for Shell<M> {
         let elapsed = started.elapsed();
         *self.shared.spent.lock().unwrap_or_else(PoisonError::into_inner).entry(self.role).or_default() += elapsed;
         outcome?;
+        self.shared.journal.handled(&Handled { seq, by: self.role, time_ns: sent_ns, took: elapsed })?;
         let (time_ns, messages) = outbox.into_messages();
         for (to, body) in messages {
             self.shared.deliver(self.role, to, Some(seq), time_ns, body);

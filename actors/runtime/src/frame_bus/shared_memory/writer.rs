@@ -9,10 +9,11 @@ use super::{
 use iceoryx2::{
     port::{LoanError, notifier::Notifier, publisher::Publisher},
     prelude::{AllocationStrategy, Node},
+    sample_mut::SampleMut,
 };
 use std::{
     fmt,
-    sync::{Mutex, PoisonError},
+    sync::{Mutex, MutexGuard, PoisonError},
 };
 
 /// The end of a shared-memory bus that frames come from. Dropping it ends the bus; frames that readers hold stay valid.
@@ -74,11 +75,19 @@ impl SharedMemoryWriter {
     /// # Errors
     /// See [`PublishError`]; after an error the bus is as before.
     pub fn publish(&self, number: u64, frame: &ByteFrame) -> Result<(), PublishError> {
+        self.prepare(number, frame)?.send()
+    }
+
+    /// Copies a frame into shared memory, to be sent later. Nobody else can publish until then.
+    ///
+    /// # Errors
+    /// As [`SharedMemoryWriter::publish`].
+    pub fn prepare(&self, number: u64, frame: &ByteFrame) -> Result<PreparedFrame<'_>, PublishError> {
         let (bytes, planes) = (frame.bytes(), frame.planes.len());
         if bytes > MAX_FRAME_BYTES || planes > MAX_PLANES {
             return Err(PublishError::TooLarge { bytes, planes });
         }
-        let mut ports = self.ports.lock().unwrap_or_else(PoisonError::into_inner);
+        let ports = self.ports.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(last) = ports.last.filter(|last| *last >= number) {
             return Err(PublishError::NotRising { number, last });
         }
@@ -89,9 +98,28 @@ impl SharedMemoryWriter {
             Err(LoanError::OutOfMemory) => return Err(PublishError::Port("no place is left for a frame".into())),
             loan => loan.map_err(|e| PublishError::Port(e.to_string()))?,
         };
-        fill(loan, number, frame).send().map_err(|e| PublishError::Port(e.to_string()))?;
-        (ports.last, ports.largest) = (Some(number), ports.largest.max(length));
-        ports.notifier.notify().map_err(|e| PublishError::Port(e.to_string()))?;
+        let sample = fill(loan, number, frame);
+        Ok(PreparedFrame { ports, sample, number, length })
+    }
+}
+
+/// A frame that lies in shared memory already: what is left is to hand it over, which costs the same for every size.
+pub struct PreparedFrame<'a> {
+    ports: MutexGuard<'a, Ports>,
+    sample: SampleMut<Service, [u8], FrameTag>,
+    number: u64,
+    length: usize,
+}
+
+impl PreparedFrame<'_> {
+    /// Hands the frame over and tells those who wait.
+    ///
+    /// # Errors
+    /// See [`PublishError`].
+    pub fn send(mut self) -> Result<(), PublishError> {
+        self.sample.send().map_err(|e| PublishError::Port(e.to_string()))?;
+        (self.ports.last, self.ports.largest) = (Some(self.number), self.ports.largest.max(self.length));
+        self.ports.notifier.notify().map_err(|e| PublishError::Port(e.to_string()))?;
         Ok(())
     }
 }
