@@ -5,18 +5,20 @@ mod font;
 use crate::{expected, fit::corners, labels};
 use acm_concept::{
     camera::RgbdFrame,
-    object::{GroundedObject, Observability, Percepts},
-    pose::Pose,
+    object::{Blindness, GroundedObject, Observability, Percepts},
     solid::{PlacedSolid, Solid},
     template::TemplateLibrary,
 };
-use glam::{DVec2, DVec3};
+use font::Font;
+use glam::DVec3;
 use image::{Rgb, RgbImage};
 
 /// Draws the frame with every object's outline and fitted solids in a colour of its own, and a line of text with its
 /// name, category, size in centimetres (`~` before sizes that were not observed) and confidence.
 ///
-/// `names` are the labels of the objects, such as their ids; objects without one are numbered.
+/// Edges of a solid that it hides itself are dotted. Every line has a dark rim, so that it shows on any background;
+/// letters and lines grow with the picture. `names` are the labels of the objects, such as their ids; objects without
+/// one are numbered.
 pub fn draw(frame: &RgbdFrame, percepts: &Percepts, names: &[Option<String>], library: &TemplateLibrary) -> RgbImage {
     let (width, height) = (frame.header.intrinsics.width, frame.header.intrinsics.height);
     let mut image =
@@ -26,13 +28,15 @@ pub fn draw(frame: &RgbdFrame, percepts: &Percepts, names: &[Option<String>], li
         pixel.0 = pixel.0.map(|value| (u16::from(value) * 3 / 5 + 30) as u8);
     }
     let owners = labels::draw(percepts);
+    let mut strokes = Strokes { width, height, scale: scale(&image), dots: Vec::new() };
     for (index, object) in percepts.objects.iter().enumerate() {
         let color = PALETTE[index % PALETTE.len()];
-        outline(&mut image, &owners, index as u16 + 1, color);
+        outline(&mut strokes, &owners, index as u16 + 1, color);
         for solid in expected::solids(&object.parts, library) {
-            wire_frame(&mut image, percepts, &solid, color);
+            wire_frame(&mut strokes, percepts, &solid, color);
         }
     }
+    strokes.paint(&mut image);
     let boxes: Vec<[i64; 4]> = percepts.objects.iter().map(|o| o.support.bounds.map(i64::from)).collect();
     let mut taken: Vec<[i64; 4]> = Vec::new();
     for (index, object) in percepts.objects.iter().enumerate() {
@@ -43,9 +47,35 @@ pub fn draw(frame: &RgbdFrame, percepts: &Percepts, names: &[Option<String>], li
         taken.push(place);
     }
     if let Some(blindness) = percepts.blindness {
-        font::text(&mut image, 8, 8, &format!("blind: {blindness:?}"), Rgb([255, 80, 80]));
+        let reason = match blindness {
+            Blindness::NoDepth => "blind: no depth",
+            Blindness::NoColor => "blind: the colour image is black",
+            Blindness::NoSupport => "blind: no surface on which things could stand",
+        };
+        note(&mut image, &[reason.into()]);
     }
     image
+}
+
+/// Writes lines into the lower left corner of a picture, such as the names of what is not in it.
+pub fn note(image: &mut RgbImage, lines: &[String]) {
+    if lines.is_empty() {
+        return;
+    }
+    let font = Font { scale: scale(image) };
+    let width = lines.iter().map(|line| font.width(line)).max().unwrap_or(0) + 4 * font.scale;
+    let height = lines.len() as i64 * font.line() + 3 * font.scale;
+    let top = i64::from(image.height()) - height;
+    plate(image, [0, top, width, top + height]);
+    for (index, text) in lines.iter().enumerate() {
+        let at = top + 2 * font.scale + index as i64 * font.line();
+        font.write(image, 2 * font.scale, at, text, Rgb([255, 255, 255]));
+    }
+}
+
+/// Pixels a dot: 1 up to 960 columns, 2 for full HD.
+fn scale(image: &RgbImage) -> i64 {
+    ((i64::from(image.width()) + 320) / 640).clamp(1, 6)
 }
 
 const PALETTE: [Rgb<u8>; 10] = [
@@ -80,8 +110,49 @@ fn size_text(object: &GroundedObject, library: &TemplateLibrary) -> String {
     format!("{mark}{size}cm {:.0}%", object.confidence * 100.0)
 }
 
-fn outline(image: &mut RgbImage, owners: &labels::LabelImage, label: u16, color: Rgb<u8>) {
-    let (width, height) = image.dimensions();
+/// Lines that are painted at last: first the dark rims of all, then their colours.
+struct Strokes {
+    width: u32,
+    height: u32,
+    scale: i64,
+    dots: Vec<(i64, i64, Rgb<u8>)>,
+}
+
+impl Strokes {
+    fn dot(&mut self, column: i64, row: i64, color: Rgb<u8>) {
+        if (0..i64::from(self.width)).contains(&column) && (0..i64::from(self.height)).contains(&row) {
+            self.dots.push((column, row, color));
+        }
+    }
+    fn paint(&self, image: &mut RgbImage) {
+        let half = self.scale / 2;
+        let square = |grown: i64| {
+            let range = -half - grown..self.scale - half + grown;
+            range.clone().flat_map(move |dy| range.clone().map(move |dx| (dx, dy)))
+        };
+        // Each pixel of a rim once: rims of neighbouring dots must not add up to black.
+        let mut dark = vec![false; self.width as usize * self.height as usize];
+        for &(column, row, _) in &self.dots {
+            for (x, y) in square(1).map(|(dx, dy)| (column + dx, row + dy)) {
+                if (0..i64::from(self.width)).contains(&x) && (0..i64::from(self.height)).contains(&y) {
+                    dark[(y * i64::from(self.width) + x) as usize] = true;
+                }
+            }
+        }
+        for index in (0..dark.len()).filter(|&i| dark[i]) {
+            let (column, row) = (index % self.width as usize, index / self.width as usize);
+            blend(image, column as i64, row as i64, Rgb([0, 0, 0]), 0.45);
+        }
+        for &(column, row, color) in &self.dots {
+            for (dx, dy) in square(0) {
+                blend(image, column + dx, row + dy, color, 0.9);
+            }
+        }
+    }
+}
+
+fn outline(strokes: &mut Strokes, owners: &labels::LabelImage, label: u16, color: Rgb<u8>) {
+    let (width, height) = owners.dimensions();
     for row in 1..height.saturating_sub(1) {
         for column in 1..width.saturating_sub(1) {
             let own = |x: u32, y: u32| owners.get_pixel(x, y).0[0] == label;
@@ -92,14 +163,14 @@ fn outline(image: &mut RgbImage, owners: &labels::LabelImage, label: u16, color:
                 near.iter().filter(|&&(x, y)| x < width && y < height && own(x, y)).count() >= 3
             };
             if own(column, row) && around.iter().any(|&(x, y)| !own(x, y) && !is_hole(x, y)) {
-                blend(image, i64::from(column), i64::from(row), color, 0.7);
+                strokes.dot(i64::from(column), i64::from(row), color);
             }
         }
     }
 }
 
-fn wire_frame(image: &mut RgbImage, percepts: &Percepts, solid: &PlacedSolid, color: Rgb<u8>) {
-    let to_camera = percepts.frame.camera_pose.inverse() * solid.pose;
+fn wire_frame(strokes: &mut Strokes, percepts: &Percepts, solid: &PlacedSolid, color: Rgb<u8>) {
+    let in_camera = PlacedSolid { solid: solid.solid, pose: percepts.frame.camera_pose.inverse() * solid.pose };
     let corners = corners(&solid.solid);
     let count = corners.len();
     let edges: Vec<(usize, usize)> = match solid.solid {
@@ -111,19 +182,40 @@ fn wire_frame(image: &mut RgbImage, percepts: &Percepts, solid: &PlacedSolid, co
             (0..count).map(|i| (i, (i + 2) % count)).chain((0..count).step_by(12).map(|i| (i, i + 1))).collect()
         }
     };
+    let mut walked = 0;
     for (a, b) in edges {
-        line(image, percepts, &to_camera, corners[a], corners[b], color);
+        let ends = [corners[a], corners[b]].map(|corner| in_camera.pose.transform_point(corner));
+        walked = line(strokes, percepts, &in_camera, ends, walked, color);
     }
 }
 
-fn line(image: &mut RgbImage, percepts: &Percepts, to_camera: &Pose, a: DVec3, b: DVec3, color: Rgb<u8>) {
-    let project = |p: DVec3| percepts.frame.intrinsics.project(to_camera.transform_point(p));
-    let (Some(a), Some(b)) = (project(a), project(b)) else { return };
+/// Draws a line between two points of the camera frame, dotted where the solid itself hides it. `walked` counts the
+/// steps before it, so that dots go on evenly round a rim; returns the count after it.
+fn line(
+    strokes: &mut Strokes,
+    percepts: &Percepts,
+    solid: &PlacedSolid,
+    [from, to]: [DVec3; 2],
+    walked: usize,
+    color: Rgb<u8>,
+) -> usize {
+    let project = |p: DVec3| percepts.frame.intrinsics.project(p);
+    let (Some(a), Some(b)) = (project(from), project(to)) else { return walked };
     let steps = (a.distance(b) * 1.5).clamp(1.0, 6000.0) as usize;
     for step in 0..=steps {
-        let at: DVec2 = a.lerp(b, step as f64 / steps as f64);
-        blend(image, at.x.round() as i64, at.y.round() as i64, color, 0.9);
+        let share = step as f64 / steps as f64;
+        let point = from.lerp(to, share);
+        // The ray reaches the point at 1; a polygon's edge lies a little inside or outside of the round solid.
+        let hidden = solid.intersect_ray(DVec3::ZERO, point).is_some_and(|(enter, _)| enter < 0.985);
+        let gap = 4 * strokes.scale as usize;
+        if hidden && !(walked + step).is_multiple_of(gap) {
+            continue;
+        }
+        if let Some(at) = project(point) {
+            strokes.dot(at.x.round() as i64, at.y.round() as i64, color);
+        }
     }
+    walked + steps
 }
 
 fn blend(image: &mut RgbImage, column: i64, row: i64, color: Rgb<u8>, share: f32) {
@@ -144,8 +236,9 @@ fn place_of(
     objects: &[[i64; 4]],
     taken: &[[i64; 4]],
 ) -> [i64; 4] {
-    let width = lines.iter().map(|line| font::width(line)).max().unwrap_or(0) + 4;
-    let height = lines.len() as i64 * font::LINE + 3;
+    let font = Font { scale: scale(image) };
+    let width = lines.iter().map(|line| font.width(line)).max().unwrap_or(0) + 4 * font.scale;
+    let height = lines.len() as i64 * font.line() + 3 * font.scale;
     let (middle, centre) = ((object[0] + object[2]) / 2, (object[1] + object[3]) / 2);
     let mut best = (i64::MAX, [0; 4]);
     for step in 0..12i64 {
@@ -189,12 +282,19 @@ fn caption(image: &mut RgbImage, place: [i64; 4], lines: &[String], object: [i64
         let at = |axis: usize| from[axis] + (end[axis] - from[axis]) * step / steps;
         blend(image, at(0), at(1), color, 0.8);
     }
+    plate(image, place);
+    let font = Font { scale: scale(image) };
+    for (index, text) in lines.iter().enumerate() {
+        let at = top + 2 * font.scale + index as i64 * font.line();
+        font.write(image, left + 2 * font.scale, at, text, color);
+    }
+}
+
+/// Darkens a rectangle so that letters show on it.
+fn plate(image: &mut RgbImage, [left, top, right, bottom]: [i64; 4]) {
     for row in top..bottom {
         for column in left..right {
-            blend(image, column, row, Rgb([0, 0, 0]), 0.65);
+            blend(image, column, row, Rgb([0, 0, 0]), 0.75);
         }
-    }
-    for (index, text) in lines.iter().enumerate() {
-        font::text(image, left + 2, top + 2 + index as i64 * font::LINE, text, color);
     }
 }
