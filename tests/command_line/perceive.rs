@@ -260,17 +260,17 @@ fn more_colour_than_depth_is_refused() {
     );
 }
 
-/// The header of a PNG that claims 60000 x 60000 pixels.
+/// The beginning of a PNG that claims 60000 x 60000 pixels.
 fn huge_png() -> Vec<u8> {
     let mut bytes = b"\x89PNG\r\n\x1a\n".to_vec();
-    let mut header = b"IHDR".to_vec();
-    header.extend(60_000u32.to_be_bytes());
-    header.extend(60_000u32.to_be_bytes());
-    header.extend([8, 2, 0, 0, 0]);
-    bytes.extend(13u32.to_be_bytes());
-    let checksum = crc32(&header);
-    bytes.extend(header);
-    bytes.extend(checksum.to_be_bytes());
+    let size = 60_000u32.to_be_bytes();
+    let header = [&size[..], &size, &[8, 2, 0, 0, 0]].concat();
+    for (kind, content) in [(b"IHDR", header), (b"IDAT", vec![0x78, 0x9c])] {
+        let checked = [&kind[..], &content].concat();
+        bytes.extend(u32::try_from(content.len()).unwrap().to_be_bytes());
+        bytes.extend(&checked);
+        bytes.extend(crc32(&checked).to_be_bytes());
+    }
     bytes
 }
 
