@@ -3,6 +3,8 @@
 
 #[path = "command_line/perceive.rs"]
 mod perceive;
+#[path = "command_line/real_frames.rs"]
+mod real_frames;
 #[path = "command_line/synthetic.rs"]
 mod synthetic;
 

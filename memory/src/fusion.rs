@@ -18,6 +18,9 @@ const FUSED_FLOOR: f64 = 0.001;
 /// A pose that moved by more combined standard deviations is taken as it is, not averaged.
 const STILL_SIGMAS: f64 = 3.0;
 
+/// A part whose own vertical has turned by more than this was tipped over: there is nothing to average.
+const TIPPED_RAD: f64 = 0.35;
+
 /// What a view of a parameter does to its estimate.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Update {
@@ -105,6 +108,10 @@ fn fuse_part(
 
 /// The mean of two poses weighted by their information, or the seen one if the thing was shifted.
 pub(crate) fn fuse_pose(known: &PoseEstimate, seen: &PoseEstimate, symmetry: YawSymmetry) -> PoseEstimate {
+    let up = |estimate: &PoseEstimate| estimate.pose.transform_vector(DVec3::Z);
+    if up(known).angle_between(up(seen)) > TIPPED_RAD {
+        return *seen;
+    }
     let (from, to) = (known.pose.translation, seen.pose.translation);
     let spread = known.position_sigma_m * known.position_sigma_m + seen.position_sigma_m * seen.position_sigma_m;
     let offset = to - from;

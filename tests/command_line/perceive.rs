@@ -3,7 +3,7 @@
 use crate::{acm, refuses, synthetic};
 use serde_json::Value;
 use std::{fs, path::Path};
-use synthetic::{INTRINSICS_TEXT, Thing, can, cuboid, write, write_blank};
+use synthetic::{INTRINSICS_TEXT, Thing, can, cuboid, lying_can, write, write_blank};
 
 const RED: [u8; 3] = [190, 40, 40];
 const GREEN: [u8; 3] = [40, 150, 60];
@@ -88,6 +88,38 @@ fn a_memory_folder_carries_identities_to_the_next_call() {
     // Without a memory the second frame knows nothing of the first.
     let alone = json(&["--color", &file("f2", "color"), "--depth", &file("f2", "depth")], 0);
     assert!(told(&alone["frames"][0]).iter().all(|(_, _, status)| status == "new"), "{alone}");
+}
+
+#[test]
+fn things_that_were_tipped_over_are_known_again() {
+    let dir = tempfile::tempdir().unwrap();
+    write(dir.path(), "1", &[cuboid([0.15, 0.07, 0.05], -0.12, 0.6, 0.3, RED), can(0.05, 0.06, 0.12, 0.5, GREEN)]);
+    write(
+        dir.path(),
+        "2",
+        &[cuboid([0.07, 0.05, 0.15], 0.1, 0.7, 0.9, RED), lying_can(0.05, 0.06, -0.1, 0.5, 0.5, GREEN)],
+    );
+    write(
+        dir.path(),
+        "3",
+        &[cuboid([0.15, 0.05, 0.07], 0.1, 0.5, 0.2, RED), lying_can(0.05, 0.06, -0.1, 0.5, 0.5, GREEN)],
+    );
+    let document = json(&["--frames", dir.path().to_str().unwrap()], 0);
+    let frames = document["frames"].as_array().unwrap();
+    let sizes = |object: &Value| -> Vec<f64> {
+        let parameters = object["parts"][0]["parameters"].as_array().unwrap();
+        parameters.iter().map(|p| p["value"].as_f64().unwrap()).collect()
+    };
+    for frame in &frames[1..] {
+        assert!(told(frame).iter().all(|(_, _, status)| status == "kept"), "{:?}", told(frame));
+        for object in frame["objects"].as_array().unwrap() {
+            let truth: &[f64] =
+                if object["parts"][0]["template"] == "box" { &[0.15, 0.07, 0.05] } else { &[0.05, 0.06] };
+            for (size, truth) in sizes(object).iter().zip(truth) {
+                assert!((size - truth).abs() < 0.008, "{object}");
+            }
+        }
+    }
 }
 
 #[test]

@@ -7,7 +7,10 @@ use acm_concept::{
 };
 use glam::{DMat3, DQuat, DVec3};
 use image::{ImageBuffer, Luma, Rgb, RgbImage};
-use std::path::{Path, PathBuf};
+use std::{
+    f64::consts::FRAC_PI_2,
+    path::{Path, PathBuf},
+};
 
 /// The camera of all frames; its numbers as the command line takes them.
 pub const INTRINSICS: Intrinsics = Intrinsics { width: 320, height: 240, fx: 290.0, fy: 290.0, cx: 159.5, cy: 119.5 };
@@ -23,6 +26,13 @@ pub fn cuboid(size: [f64; 3], x: f64, y: f64, yaw: f64, color: [u8; 3]) -> Thing
 
 pub fn can(radius: f64, height: f64, x: f64, y: f64, color: [u8; 3]) -> Thing {
     let pose = Pose::from_translation(DVec3::new(x, y, height / 2.0));
+    (PlacedSolid { solid: Solid::Cylinder { radius, height }, pose }, color)
+}
+
+/// A can that lies on its side, its axis level and at a heading.
+pub fn lying_can(radius: f64, height: f64, x: f64, y: f64, heading: f64, color: [u8; 3]) -> Thing {
+    let rotation = DQuat::from_rotation_z(heading) * DQuat::from_rotation_y(FRAC_PI_2);
+    let pose = Pose::new(DVec3::new(x, y, radius), rotation);
     (PlacedSolid { solid: Solid::Cylinder { radius, height }, pose }, color)
 }
 

@@ -50,9 +50,14 @@ impl Pose {
     pub fn transform_vector(&self, vector: DVec3) -> DVec3 {
         self.rotation * vector
     }
-    /// Heading of the frame's x axis seen from above, radians in (-pi, pi].
+    /// Heading of the frame's x axis seen from above, radians in (-pi, pi]; of its y axis less a quarter turn where x
+    /// points straight up or down and has none.
     pub fn yaw(&self) -> f64 {
         let x = self.rotation * DVec3::X;
+        if x.truncate().length() < 0.05 {
+            let y = self.rotation * DVec3::Y;
+            return (-y.x).atan2(y.y);
+        }
         x.y.atan2(x.x)
     }
     /// Angle of the shortest rotation to `other`, radians in [0, pi].

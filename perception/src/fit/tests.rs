@@ -120,7 +120,7 @@ fn the_state_maps_onto_the_parameters() {
     assert_eq!((model.yaw_index(), model.base_index(), model.parameter_index(2)), (Some(2), Some(3), Some(6)));
     let placement = model.placement(&state);
     assert!(placement.pose.translation.distance(DVec3::new(1.0, 2.0, 0.3)) < 1e-12);
-    let rigid = Model::rigid(&template, vec![0.2, 0.1, 0.05], Base::At(0.0)).unwrap();
+    let rigid = Model::new(&template, vec![0.2, 0.1, 0.05], Base::At(0.0)).unwrap().rigid();
     assert_eq!(rigid.start(DVec2::ZERO, 0.5).len(), 3);
     assert_eq!(rigid.placement(&[0.0, 0.0, 0.0]).values, [0.2, 0.1, 0.05]);
 }
