@@ -1,6 +1,6 @@
 //! The command line and its exit codes.
 
-use crate::{demo, doctor, inject::Injection, perceive, run, scenario};
+use crate::{bench, demo, doctor, inject::Injection, perceive, run, scenario};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::{path::PathBuf, process::ExitCode, str::FromStr};
 
@@ -59,6 +59,9 @@ pub enum Command {
     /// List, check, describe or draw scenarios.
     #[command(subcommand)]
     Scenario(ScenarioCommand),
+    /// Measure figures and print them beside what they are to reach.
+    #[command(subcommand)]
+    Bench(BenchCommand),
     /// Say what this machine has of what ACM needs.
     Doctor,
 }
@@ -229,6 +232,27 @@ pub enum ScenarioCommand {
     },
 }
 
+/// The benches.
+#[derive(Debug, Subcommand)]
+pub enum BenchCommand {
+    /// Segmentation of real labelled frames (found through the variable ACM_DATA) and the time a frame takes.
+    Perception(BenchArgs),
+}
+
+/// Arguments of every bench.
+#[derive(Debug, Args)]
+pub struct BenchArgs {
+    /// Most episodes or frames; all that there are if not given.
+    #[arg(long, value_name = "N")]
+    pub episodes: Option<usize>,
+    /// Write the result, with all rows, into this file.
+    #[arg(long, value_name = "FILE")]
+    pub json: Option<PathBuf>,
+    /// Compare with the targets of this file instead of the built-in ones.
+    #[arg(long, value_name = "FILE")]
+    pub against: Option<PathBuf>,
+}
+
 /// Performs a command.
 pub fn run(cli: Cli) -> anyhow::Result<Exit> {
     match cli.command {
@@ -236,6 +260,7 @@ pub fn run(cli: Cli) -> anyhow::Result<Exit> {
         Command::Demo(args) => demo::run(&args),
         Command::Perceive(args) => perceive::run(&args),
         Command::Scenario(command) => scenario::run(&command),
+        Command::Bench(command) => bench::run(&command),
         Command::Doctor => doctor::run(),
     }
 }

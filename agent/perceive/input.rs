@@ -128,7 +128,7 @@ fn split_name(name: &str) -> Option<(&str, Role)> {
 }
 
 /// The frames of a folder, sorted.
-fn pairs_in(folder: &Path) -> anyhow::Result<Vec<FramePair>> {
+pub(crate) fn pairs_in(folder: &Path) -> anyhow::Result<Vec<FramePair>> {
     let cannot_read = || format!("the folder {} cannot be read; check the path", folder.display());
     let mut found: BTreeMap<String, [Option<PathBuf>; 2]> = BTreeMap::new();
     for entry in std::fs::read_dir(folder).with_context(cannot_read)? {

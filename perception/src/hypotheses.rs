@@ -278,7 +278,9 @@ pub(crate) fn categories(hypotheses: &[Hypothesis], context: Context) -> Vec<(St
             *nouns.entry(noun).or_insert(0.0) += hypothesis.probability * weight((place, noun)) / total;
         }
     }
-    let mut categories: Vec<(String, f64)> = nouns.into_iter().map(|(noun, p)| (noun.to_string(), p)).collect();
+    // A sum of shares may round to a little over one.
+    let mut categories: Vec<(String, f64)> =
+        nouns.into_iter().map(|(noun, p)| (noun.to_string(), p.min(1.0))).collect();
     categories.sort_by(|a, b| b.1.total_cmp(&a.1));
     categories
 }
