@@ -63,6 +63,10 @@ const TRACKED_CUT: f64 = 0.15;
 /// this much more, are dropped.
 const HOPELESS_FACTOR: f64 = 1.5;
 const HOPELESS_COST: f64 = 25.0;
+/// Before any fit, templates whose best start costs more than this many times the best one's, and this much more, are
+/// dropped.
+const FORLORN_FACTOR: f64 = 4.0;
+const FORLORN_COST: f64 = 100.0;
 /// Starts that are fitted of each template.
 const STARTS: usize = 2;
 
@@ -77,8 +81,15 @@ pub(crate) fn rank<'a>(context: Context<'a>, measured: &Measured, evidence: &Evi
         let rests = template.rests.iter().filter(lying).map(Some);
         std::iter::once(None).chain(rests).map(move |rest| (template, rest))
     });
-    let near: Vec<Approach> =
-        stances.filter_map(|stance| nearest(stance, measured, &rectangles, circle, evidence)).collect();
+    let starts: Vec<Starts> =
+        stances.filter_map(|stance| Starts::of(stance, measured, &rectangles, circle, evidence)).collect();
+    let least = starts.iter().map(|s| s.rough).fold(f64::INFINITY, f64::min);
+    // What is far behind before any fit is not worth a rough one.
+    let near: Vec<Approach> = starts
+        .into_iter()
+        .filter(|s| s.rough < FORLORN_FACTOR * least + FORLORN_COST)
+        .filter_map(|s| s.nearest(evidence))
+        .collect();
     let best = near.iter().map(|a| a.cost).fold(f64::INFINITY, f64::min);
     // What is far behind after the rough fit is not worth a fine one.
     let promising = near.into_iter().filter(|a| a.cost < HOPELESS_FACTOR * best + HOPELESS_COST);
@@ -110,45 +121,63 @@ struct Approach<'a> {
     cost: f64,
 }
 
-/// The best of several starts of a template in a stance, brought near to a minimum.
-fn nearest<'a>(
-    (template, rest): (&'a Template, Option<&'a Rest>),
-    measured: &Measured,
-    rectangles: &[Rectangle],
-    circle: Option<(DVec2, f64)>,
-    evidence: &Evidence,
-) -> Option<Approach<'a>> {
-    let smallest = measure::smallest(rectangles)?;
-    let fallback = (smallest.centre, 0.25 * (smallest.length + smallest.width));
-    let (centre, radius) =
-        circle.filter(|(_, r)| *r < smallest.length && *r > 0.2 * smallest.length).unwrap_or(fallback);
-    let height_m = measured.height_m.max(0.0);
-    let start_at = |(rectangle, along): (&Rectangle, DVec2)| {
-        let measures = match rest {
-            None => [rectangle.length, rectangle.width, height_m, radius],
-            Some(rest) => upright_measures(rest, along.extend(height_m)),
+/// The best starts of a template in a stance.
+struct Starts<'a> {
+    starts: Vec<(Model<'a>, Vec<f64>)>,
+    /// Rough cost of the first.
+    rough: f64,
+}
+
+impl<'a> Starts<'a> {
+    fn of(
+        (template, rest): (&'a Template, Option<&'a Rest>),
+        measured: &Measured,
+        rectangles: &[Rectangle],
+        circle: Option<(DVec2, f64)>,
+        evidence: &Evidence,
+    ) -> Option<Starts<'a>> {
+        let smallest = measure::smallest(rectangles)?;
+        let fallback = (smallest.centre, 0.25 * (smallest.length + smallest.width));
+        let (centre, radius) =
+            circle.filter(|(_, r)| *r < smallest.length && *r > 0.2 * smallest.length).unwrap_or(fallback);
+        let height_m = measured.height_m.max(0.0);
+        let start_at = |(rectangle, along): (&Rectangle, DVec2)| {
+            let measures = match rest {
+                None => [rectangle.length, rectangle.width, height_m, radius],
+                Some(rest) => upright_measures(rest, along.extend(height_m)),
+            };
+            let model = Model::new(template, template.initial_values(measures).ok()?, measured.base)?.lying(rest);
+            let at = if model.turns { rectangle.centre } else { centre };
+            // The measures are along the longer side, or across it.
+            let quarter = if along.x < along.y { FRAC_PI_2 } else { 0.0 };
+            let start = model.start(at, rectangle.yaw + quarter);
+            Some((model, start))
         };
-        let model = Model::new(template, template.initial_values(measures).ok()?, measured.base)?.lying(rest);
-        let at = if model.turns { rectangle.centre } else { centre };
-        // The measures are along the longer side, or across it.
-        let quarter = if along.x < along.y { FRAC_PI_2 } else { 0.0 };
-        let start = model.start(at, rectangle.yaw + quarter);
-        Some((rough_cost(&model, evidence, &start), model, start))
-    };
-    // In another rest either side of the rectangle may be the part's own height.
-    let ways = |rectangle| {
-        let sides = |r: &Rectangle| DVec2::new(r.length, r.width);
-        let across = rest.map(|_| (rectangle, sides(rectangle).yx()));
-        std::iter::once((rectangle, sides(rectangle))).chain(across)
-    };
-    let mut starts: Vec<_> = rectangles.iter().flat_map(ways).filter_map(start_at).collect();
-    starts.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let turns = starts.first().is_some_and(|(_, model, _)| model.turns);
-    let near = starts.into_iter().take(if turns { STARTS } else { 1 }).map(|(_, model, start)| {
-        let state = approach(&model, evidence, &start);
-        Approach { cost: cost(&model, evidence, &state), model, state }
-    });
-    near.min_by(|a, b| a.cost.total_cmp(&b.cost))
+        // In another rest either side of the rectangle may be the part's own height.
+        let ways = |rectangle| {
+            let sides = |r: &Rectangle| DVec2::new(r.length, r.width);
+            let across = rest.map(|_| (rectangle, sides(rectangle).yx()));
+            std::iter::once((rectangle, sides(rectangle))).chain(across)
+        };
+        let mut starts: Vec<_> = rectangles.iter().flat_map(ways).filter_map(start_at).collect();
+        // What is round starts alike in every rectangle.
+        starts.dedup_by(|a, b| a.1 == b.1);
+        let mut rated: Vec<_> =
+            starts.into_iter().map(|(model, start)| (rough_cost(&model, evidence, &start), model, start)).collect();
+        rated.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let (rough, turns) = rated.first().map(|(rough, model, _)| (*rough, model.turns))?;
+        rated.truncate(if turns { STARTS } else { 1 });
+        Some(Starts { starts: rated.into_iter().map(|(_, model, start)| (model, start)).collect(), rough })
+    }
+
+    /// The best of the starts, brought near to a minimum.
+    fn nearest(self, evidence: &Evidence) -> Option<Approach<'a>> {
+        let near = self.starts.into_iter().map(|(model, start)| {
+            let state = approach(&model, evidence, &start);
+            Approach { cost: cost(&model, evidence, &state), model, state }
+        });
+        near.min_by(|a, b| a.cost.total_cmp(&b.cost))
+    }
 }
 
 /// The measures of a segment as they would be if the part were stood upright, from its extents along the axes of its
