@@ -126,16 +126,17 @@ pub fn run(command: &BenchCommand) -> anyhow::Result<Exit> {
     let (args, measure): (&BenchArgs, fn(&BenchArgs) -> anyhow::Result<BenchResult>) = match command {
         BenchCommand::Perception(args) => (args, perception::measure),
     };
-    finish(args, &measure(args)?)
-}
-
-/// Prints a result beside its targets, writes it where it is asked for, and says how the process ends.
-pub fn finish(args: &BenchArgs, result: &BenchResult) -> anyhow::Result<Exit> {
+    // First, so that a mistake in the file does not cost the measurement.
     let targets = match &args.against {
         Some(path) => Targets::read(path)?,
         None => Targets::own()?,
     };
-    result.print(&targets, &mut io::stdout().lock())?;
+    finish(args, &targets, &measure(args)?)
+}
+
+/// Prints a result beside its targets, writes it where it is asked for, and says how the process ends.
+fn finish(args: &BenchArgs, targets: &Targets, result: &BenchResult) -> anyhow::Result<Exit> {
+    result.print(targets, &mut io::stdout().lock())?;
     if let Some(path) = &args.json {
         write_json(path, result)?;
     }

@@ -2,6 +2,7 @@
 
 pub mod input;
 pub mod report;
+pub mod sample;
 
 use crate::cli::{Exit, PerceiveArgs};
 use acm_concept::{

@@ -210,6 +210,20 @@ mod tests {
         assert!(fused[0].pose.pose.yaw().abs() < 0.02, "{}", fused[0].pose.pose.yaw());
     }
 
+    #[test]
+    fn a_tipped_can_is_where_it_is_seen_and_keeps_its_sizes() {
+        let library = default_library().unwrap();
+        let can = Thing::can(0.05, 0.06).at(0.1, 0.2, 0.0);
+        let mut seen = Thing::can(0.052, 0.06).at(0.1, 0.2, 0.05);
+        seen.part.pose.pose.rotation = DQuat::from_rotation_x(std::f64::consts::FRAC_PI_2);
+        let fused = fuse_parts(&can.parts(), &seen.parts(), false, &library).unwrap();
+        assert_eq!(fused[0].pose, seen.part.pose);
+        assert!((fused[0].value("radius").unwrap() - 0.051).abs() < 1e-9);
+        // Half a turn shows the other end of a lying can, and nothing else looks alike.
+        assert_eq!(crate::geometry::symmetry(&fused[0], &library), YawSymmetry::Fold(2));
+        assert_eq!(crate::geometry::symmetry(&can.part, &library), YawSymmetry::Continuous);
+    }
+
     proptest! {
         #[test]
         fn fusion_lies_between_and_is_surer(a in 0.05..0.051f64, b in 0.05..0.051f64, s in 0.002..0.01f64, t in 0.002..0.01f64) {
