@@ -9,7 +9,7 @@
 //! | [`narrate`] | the story of an episode, told from its messages |
 //! | [`demo`] | `acm demo`: the first minute |
 //! | [`perceive`] | `acm perceive`: real frames, no simulator |
-//! | [`bench`] | `acm bench`: figures beside what they are to reach |
+//! | [`mod@bench`] | `acm bench`: figures beside what they are to reach |
 //! | [`scenario`], [`doctor`] | `acm scenario`, `acm doctor` |
 //! | [`statistics`] | proportions with intervals |
 
