@@ -3,8 +3,10 @@
 //! | module | holds |
 //! |---|---|
 //! | [`targets`] | floors and goals, and the comparison with them |
+//! | [`perception`] | segmentation of real frames and the time a frame takes |
 //! | [`runtime`] | frames and messages from one to the other, the trace, restarts |
 
+pub mod perception;
 pub mod runtime;
 pub mod targets;
 
@@ -130,24 +132,20 @@ impl BenchResult {
 /// Runs `acm bench`. It ends with 1 if a figure misses its floor.
 pub fn run(command: &BenchCommand) -> anyhow::Result<Exit> {
     let (args, measure): (&BenchArgs, fn(&BenchArgs) -> anyhow::Result<BenchResult>) = match command {
+        BenchCommand::Perception(args) => (args, perception::measure),
         BenchCommand::Runtime(args) => (args, runtime::measure),
     };
-    // Targets that cannot be read must not cost a measurement.
-    drop(targets_of(args)?);
-    finish(args, &measure(args)?)
-}
-
-fn targets_of(args: &BenchArgs) -> anyhow::Result<Targets> {
-    match &args.against {
-        Some(path) => Targets::read(path),
-        None => Targets::own(),
-    }
+    // First, so that a mistake in the file does not cost the measurement.
+    let targets = match &args.against {
+        Some(path) => Targets::read(path)?,
+        None => Targets::own()?,
+    };
+    finish(args, &targets, &measure(args)?)
 }
 
 /// Prints a result beside its targets, writes it where it is asked for, and says how the process ends.
-pub fn finish(args: &BenchArgs, result: &BenchResult) -> anyhow::Result<Exit> {
-    let targets = targets_of(args)?;
-    result.print(&targets, &mut io::stdout().lock())?;
+fn finish(args: &BenchArgs, targets: &Targets, result: &BenchResult) -> anyhow::Result<Exit> {
+    result.print(targets, &mut io::stdout().lock())?;
     if let Some(path) = &args.json {
         write_json(path, result)?;
     }

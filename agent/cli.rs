@@ -60,7 +60,7 @@ pub enum Command {
     Run(RunArgs),
     /// Tell the story of one episode, then of the same robot without its memory.
     Demo(DemoArgs),
-    /// Ground one real RGB-D frame into objects; no simulator.
+    /// Ground real RGB-D frames into objects with identities; no simulator.
     Perceive(PerceiveArgs),
     /// List, check, describe or draw scenarios.
     #[command(subcommand)]
@@ -200,28 +200,41 @@ pub struct DemoArgs {
 /// Arguments of `acm perceive`.
 #[derive(Debug, Args)]
 pub struct PerceiveArgs {
-    /// Colour image: 8-bit PNG.
-    #[arg(long, value_name = "FILE")]
-    pub color: PathBuf,
+    /// Colour image: 8-bit PNG. May be given more than once, with as many --depth, for several frames in order.
+    #[arg(long, value_name = "FILE", requires = "depth", required_unless_present = "frames")]
+    pub color: Vec<PathBuf>,
     /// Depth image registered to the colour: 16-bit grey PNG of the same size, 0 where nothing was measured.
-    #[arg(long, value_name = "FILE")]
-    pub depth: PathBuf,
-    /// fx,fy,cx,cy in pixels.
-    #[arg(long, value_name = "FX,FY,CX,CY", value_delimiter = ',', num_args = 1, required = true)]
-    pub intrinsics: Vec<f64>,
+    #[arg(long, value_name = "FILE", requires = "color")]
+    pub depth: Vec<PathBuf>,
+    /// A folder of frames instead: STEM_color.png beside STEM_depth.png (or with `-` or `.` for the `_`), taken in
+    /// the order of their names, numbers in them by value.
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["color", "depth"])]
+    pub frames: Option<PathBuf>,
+    /// fx,fy,cx,cy in pixels; the centre of the upper left pixel is 0,0.
+    #[arg(long, value_name = "FX,FY,CX,CY", allow_hyphen_values = true)]
+    pub intrinsics: String,
     /// Metres per unit of the depth image.
-    #[arg(long, value_name = "M", default_value_t = 0.001)]
+    #[arg(long, value_name = "M", default_value_t = 0.001, allow_hyphen_values = true)]
     pub depth_scale: f64,
+    /// Pose of the camera (x right, y down, z ahead) in a world whose z is up, for all frames: metres and a unit
+    /// quaternion. Without a pose the plane is z = 0, x the camera's right, the origin under the camera.
+    #[arg(long, value_name = "X,Y,Z,QX,QY,QZ,QW", allow_hyphen_values = true)]
+    pub camera_pose: Option<String>,
+    /// A text file with a line `STEM x y z qx qy qz qw` for every frame; `#` begins a comment.
+    #[arg(long, value_name = "FILE", conflicts_with = "camera_pose")]
+    pub camera_poses: Option<PathBuf>,
     /// Keep what is seen in this memory folder, and go on with what it holds.
     #[arg(long, value_name = "DIR")]
     pub memory: Option<PathBuf>,
-    /// Draw outlines, ids, sizes and fitted solids over the colour image into this PNG.
-    #[arg(long, value_name = "FILE")]
+    /// Draw outlines, ids, sizes and fitted solids over the colour image: a PNG for one frame; for several, or with
+    /// --frames, a folder that receives STEM_overlay.png.
+    #[arg(long, value_name = "PATH")]
     pub overlay: Option<PathBuf>,
-    /// Write a 16-bit PNG with one value an object, 0 for the background.
-    #[arg(long, value_name = "FILE")]
+    /// Write a 16-bit PNG with one value an object, 0 for the background: a file, or a folder that receives
+    /// STEM_label.png.
+    #[arg(long, value_name = "PATH")]
     pub labels: Option<PathBuf>,
-    /// Print JSON instead of text.
+    /// Print JSON (docs/perceive.md) instead of text.
     #[arg(long)]
     pub json: bool,
 }
@@ -342,6 +355,8 @@ pub struct TraceShowArgs {
 /// The benches.
 #[derive(Debug, Subcommand)]
 pub enum BenchCommand {
+    /// Segmentation of real labelled frames (found through the variable ACM_DATA) and the time a frame takes.
+    Perception(BenchArgs),
     /// Frames between processes, messages between actors, what a trace costs, how fast an actor is replaced.
     Runtime(BenchArgs),
 }

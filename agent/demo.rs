@@ -5,6 +5,7 @@ use crate::{
     episode::{EpisodeConfig, EpisodeResult, Runner},
     inject::{Faults, FrameTap, Injection},
     narrate::Narrator,
+    perceive,
 };
 use acm_actors::{episode::WipeAt, message::Message, report::Ending};
 use acm_concept::{literal::Evidence, object::Percepts};
@@ -72,6 +73,9 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<Exit> {
 
     let picture = picture(&runner, &listener, &tap, &args.out)?;
     more_seeds(&runner, &scenario, args.seed, began, &mut out)?;
+    if let Some(line) = perceive::sample::photograph(&args.out.join("real.png"))? {
+        writeln!(out, "REAL CAMERA   one RGB-D photograph from a real sensor; {line}")?;
+    }
     writeln!(out, "Look at {}   Next: acm run {SCENARIO} --seed {}", picture.display(), args.seed + 1)?;
     let exit = told.solved && honest;
     Ok(if exit { Exit::Success } else { Exit::Failed })

@@ -11,7 +11,7 @@
 //! | [`narrate`] | the story of an episode, told from its messages |
 //! | [`demo`] | `acm demo`: the first minute |
 //! | [`perceive`] | `acm perceive`: real frames, no simulator |
-//! | [`bench`](mod@bench) | `acm bench`: figures beside what they are to reach |
+//! | [`mod@bench`] | `acm bench`: figures beside what they are to reach |
 //! | [`scenario`], [`doctor`] | `acm scenario`, `acm doctor` |
 //! | [`trace`] | `acm trace`: a run written down, and looked into |
 //! | [`video`] | `acm run --video`: an episode as moving pictures |

@@ -20,10 +20,21 @@ fn main() -> ExitCode {
         Ok(exit) => exit.into(),
         Err(error) if is_broken_pipe(&error) => Exit::Success.into(),
         Err(error) => {
-            eprintln!("acm: {}", one_line(&format!("{error:#}")));
+            eprintln!("acm: {}", one_line(&story(&error)));
             acm::cli::exit_of_error(&error).into()
         }
     }
+}
+
+/// An error and its causes, those left out that the error before them has told already.
+fn story(error: &anyhow::Error) -> String {
+    let mut story: Vec<String> = Vec::new();
+    for cause in error.chain().map(ToString::to_string) {
+        if !story.last().is_some_and(|told| told.contains(&cause)) {
+            story.push(cause);
+        }
+    }
+    story.join(": ")
 }
 
 /// A message on one line: what parsers print of the file itself, under a bar, is left out.

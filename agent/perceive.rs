@@ -1,66 +1,111 @@
-//! `acm perceive`: grounds one real frame and writes it to memory; no simulator.
+//! `acm perceive`: grounds real frames one after the other over one memory; no simulator.
+
+pub mod input;
+pub mod report;
+pub mod sample;
 
 use crate::cli::{Exit, PerceiveArgs};
 use acm_concept::{
     camera::{FrameHeader, RgbdFrame},
     embodiment::Feedback,
-    ids::{FrameId, ObjectId},
-    object::{GroundedObject, Observability, Percepts},
+    ids::FrameId,
+    object::Percepts,
     pose::Pose,
     template::TemplateLibrary,
     time::Time,
 };
 use acm_memory::{
     Memory,
-    observation::{Grounding, Note, Observation},
+    observation::{Note, Observation},
 };
 use acm_perception::{Grounder, GrounderConfig, frames, labels, overlay};
-use anyhow::{Context, bail};
+use anyhow::Context;
 use glam::DVec3;
-use serde::Serialize;
-use std::{io::Write, sync::Arc};
+use indicatif::{ProgressBar, ProgressStyle};
+use input::{Input, Pictures};
+use report::{FrameReport, Report};
+use std::{
+    io::{IsTerminal, Write},
+    path::Path,
+    sync::Arc,
+};
 
-/// Runs `acm perceive`.
+/// Files do not say when they were taken: frames count as this far apart, seconds.
+const FRAME_INTERVAL_S: f64 = 1.0;
+
+/// Runs `acm perceive`. It ends with 3 if a frame could not be grounded (black, without depth, without a surface): such
+/// a frame says so in its report and changes nothing in memory; the others are grounded all the same.
 pub fn run(args: &PerceiveArgs) -> anyhow::Result<Exit> {
-    let &[fx, fy, cx, cy] = args.intrinsics.as_slice() else {
-        bail!("--intrinsics needs four numbers fx,fy,cx,cy, got {}", args.intrinsics.len());
-    };
+    let input = Input::read(args)?;
+    let pictures = Pictures::prepare(args, input.frames.len())?;
     let library = Arc::new(acm_memory::default_library()?);
-    let mut memory: Box<dyn Memory> = match &args.memory {
+    let memory: Box<dyn Memory> = match &args.memory {
         Some(dir) => Box::new(acm_memory::AcmMemory::open(dir, Arc::clone(&library))?),
         None => Box::new(acm_memory::AcmMemory::in_memory(Arc::clone(&library))),
     };
-    let id = FrameId(u64::from(memory.view().frames_seen()));
-    let frame = frames::read_pair(&args.color, &args.depth, (fx, fy, cx, cy), args.depth_scale, None, id, Time::ZERO)?;
-    let frame = level(frame);
     let grounder = Grounder::new(Arc::clone(&library), GrounderConfig::default());
-    let percepts = grounder.ground(&frame, &memory.expect(Time::ZERO));
-    memory.note(&Note::EpisodeBegan)?;
-    let grounding =
-        memory.observe(&Observation { percepts: &percepts, frame: &frame, feedback: &no_robot(&frame.header) })?;
-    let ids = ids(&percepts, &grounding);
-    if let Some(path) = &args.overlay {
-        let names: Vec<Option<String>> = ids.iter().map(|id| id.map(|id| id.to_string())).collect();
-        let image = overlay::draw(&frame, &percepts, &names, &library);
-        image.save(path).with_context(|| format!("the picture {} cannot be written", path.display()))?;
+    let mut session = Session { input: &input, pictures, library, memory, grounder };
+    session.memory.note(&Note::EpisodeBegan)?;
+    let progress = Progress::new(input.frames.len());
+    let mut reports = Vec::new();
+    let mut blind = false;
+    for index in 0..input.frames.len() {
+        let report = session.perceive(index)?;
+        blind |= report.blindness.is_some();
+        progress.done(index);
+        match args.json {
+            true => reports.push(report),
+            false => progress.beside(|| report.print(&session.library, &mut std::io::stdout().lock()))?,
+        }
     }
-    if let Some(path) = &args.labels {
-        let image = labels::draw(&percepts);
-        image.save(path).with_context(|| format!("the label image {} cannot be written", path.display()))?;
+    progress.bar.finish_and_clear();
+    if args.json {
+        let mut out = std::io::stdout().lock();
+        serde_json::to_writer_pretty(&mut out, &Report::new(&reports))?;
+        writeln!(out)?;
     }
-    match args.json {
-        true => print_json(&percepts, &ids, &library)?,
-        false => print_text(&percepts, &ids, &library)?,
-    }
-    Ok(if percepts.blindness.is_some() { Exit::GaveUp } else { Exit::Success })
+    Ok(if blind { Exit::GaveUp } else { Exit::Success })
 }
 
-/// Without a camera pose the world is the surface's: z = 0 on the plane, x to the camera's right.
-fn level(mut frame: RgbdFrame) -> RgbdFrame {
-    if let Some(pose) = acm_perception::level(&frame, &GrounderConfig::default()) {
-        frame.header.camera_pose = pose;
+/// What all frames of one call share.
+struct Session<'a> {
+    input: &'a Input,
+    pictures: Pictures,
+    library: Arc<TemplateLibrary>,
+    memory: Box<dyn Memory>,
+    grounder: Grounder,
+}
+
+impl Session<'_> {
+    fn perceive(&mut self, index: usize) -> anyhow::Result<FrameReport> {
+        let files = &self.input.frames[index];
+        let (intrinsics, scale) = (self.input.intrinsics, self.input.depth_scale_m);
+        let id = FrameId(index as u64);
+        let time = Time::from_seconds(FRAME_INTERVAL_S * index as f64);
+        let frame = frames::read_pair(&files.color, &files.depth, intrinsics, scale, files.camera_pose, id, time)?;
+        let percepts = self.grounder.ground(&frame, &self.memory.expect(time));
+        let observation = Observation { percepts: &percepts, frame: &frame, feedback: &no_robot(&frame.header) };
+        let grounding = self.memory.observe(&observation)?;
+        let report = FrameReport::new(files, &percepts, &grounding, self.memory.view().as_ref());
+        self.draw(&files.stem, &frame, &percepts, &report)?;
+        Ok(report)
     }
-    frame
+
+    fn draw(&self, stem: &str, frame: &RgbdFrame, percepts: &Percepts, report: &FrameReport) -> anyhow::Result<()> {
+        if let Some(path) = self.pictures.overlay(stem) {
+            let mut picture = overlay::draw(frame, percepts, &report.names(), &self.library);
+            overlay::note(&mut picture, &report.remarks());
+            save(&path, "picture", picture.save(&path))?;
+        }
+        if let Some(path) = self.pictures.labels(stem) {
+            save(&path, "label image", labels::draw(percepts).save(&path))?;
+        }
+        Ok(())
+    }
+}
+
+fn save(path: &Path, what: &str, result: image::ImageResult<()>) -> anyhow::Result<()> {
+    result.with_context(|| format!("the {what} {} cannot be written; check that its folder exists", path.display()))
 }
 
 /// There is no robot in front of a photograph.
@@ -76,82 +121,37 @@ fn no_robot(header: &FrameHeader) -> Feedback {
     }
 }
 
-fn ids(percepts: &Percepts, grounding: &Grounding) -> Vec<Option<ObjectId>> {
-    let of = |index| grounding.resolved.iter().find(|resolved| resolved.percept == index).map(|r| r.object);
-    (0..percepts.objects.len()).map(of).collect()
+/// Counted progress on standard error: a bar on a terminal, now and then a line elsewhere.
+struct Progress {
+    bar: ProgressBar,
+    count: usize,
 }
 
-fn print_text(percepts: &Percepts, ids: &[Option<ObjectId>], library: &TemplateLibrary) -> anyhow::Result<()> {
-    let mut out = std::io::stdout().lock();
-    if let Some(blindness) = percepts.blindness {
-        writeln!(out, "nothing can be grounded: {blindness:?} ({:.0} % depth)", 100.0 * percepts.depth_fraction)?;
-    }
-    writeln!(
-        out,
-        "{} objects; depth on {:.0} % of the pixels",
-        percepts.objects.len(),
-        100.0 * percepts.depth_fraction
-    )?;
-    for (object, id) in percepts.objects.iter().zip(ids) {
-        let name = id.map_or_else(|| "-".into(), |id| id.to_string());
-        writeln!(out, "{name:<4} {}", describe(object, library))?;
-    }
-    Ok(())
-}
+impl Progress {
+    /// Fewer frames than this are done before anyone wonders.
+    const LONG: usize = 8;
 
-/// One object in a line: category, dimensions in centimetres, place, confidence.
-pub fn describe(object: &GroundedObject, _library: &TemplateLibrary) -> String {
-    let dimensions = object.parts.first().map(|part| {
-        let one = |p: &acm_concept::object::ParameterEstimate| {
-            let mark = match p.observability {
-                Observability::Observed => format!("+-{:.1}", 100.0 * p.sigma),
-                Observability::Interval { low, high } => format!(" in [{:.1}, {:.1}]", 100.0 * low, 100.0 * high),
-                Observability::PriorOnly => " (not seen)".into(),
-            };
-            format!("{} {:.1}{mark}", p.name, 100.0 * p.value)
+    fn new(count: usize) -> Progress {
+        if count < Progress::LONG {
+            return Progress { bar: ProgressBar::hidden(), count };
+        }
+        let bar = ProgressBar::new(count as u64);
+        let style = ProgressStyle::with_template("{bar:30} {pos}/{len} frames {elapsed} eta {eta}");
+        let bar = match style {
+            Ok(style) => bar.with_style(style),
+            Err(_template) => bar,
         };
-        part.parameters.iter().map(one).collect::<Vec<_>>().join(", ")
-    });
-    let at = object.pose().map_or(DVec3::NAN, |pose| pose.pose.translation);
-    format!(
-        "{:<10} {} cm at ({:.3}, {:.3}, {:.3}) m, {} pixels, confidence {:.2}{}",
-        object.category,
-        dimensions.unwrap_or_default(),
-        at.x,
-        at.y,
-        at.z,
-        object.support.count,
-        object.confidence,
-        if object.truncated { ", cut off" } else { "" }
-    )
-}
-
-#[derive(Serialize)]
-struct Perceived<'a> {
-    schema: &'static str,
-    objects: Vec<Line<'a>>,
-    percepts: &'a Percepts,
-}
-
-#[derive(Serialize)]
-struct Line<'a> {
-    id: Option<ObjectId>,
-    category: &'a str,
-    summary: String,
-}
-
-fn print_json(percepts: &Percepts, ids: &[Option<ObjectId>], library: &TemplateLibrary) -> anyhow::Result<()> {
-    let line = |(object, id): (&'_ GroundedObject, &Option<ObjectId>)| (*id, describe(object, library));
-    let objects = percepts
-        .objects
-        .iter()
-        .zip(ids)
-        .map(|pair| {
-            let (id, summary) = line(pair);
-            Line { id, category: &pair.0.category, summary }
-        })
-        .collect();
-    serde_json::to_writer_pretty(std::io::stdout().lock(), &Perceived { schema: "acm.perceive/1", objects, percepts })?;
-    println!();
-    Ok(())
+        Progress { bar, count }
+    }
+    fn done(&self, index: usize) {
+        self.bar.inc(1);
+        let (done, step) = (index + 1, (self.count / 10).max(1));
+        if self.count >= Progress::LONG && done.is_multiple_of(step) && !std::io::stderr().is_terminal() {
+            eprintln!("acm: {done} of {} frames", self.count);
+        }
+    }
+    /// Prints without tearing the bar.
+    fn beside(&self, print: impl FnOnce() -> std::io::Result<()>) -> std::io::Result<()> {
+        self.bar.suspend(print)
+    }
 }

@@ -18,7 +18,7 @@ pub fn draw(image: &mut RgbImage, header: &FrameHeader, object: &ObjectEntry, li
     let to_camera = header.camera_pose.inverse();
     let mut top: Option<DVec2> = None;
     for part in &object.parts {
-        let solids = library.get(&part.template).and_then(|template| template.solids(&part.values()).ok());
+        let solids = library.solids_of(part);
         for placed in solids.unwrap_or_default() {
             let pose: Pose = to_camera * part.pose.pose * placed.pose;
             for [from, to] in edges(&placed.solid) {

@@ -18,6 +18,9 @@ const FUSED_FLOOR: f64 = 0.001;
 /// A pose that moved by more combined standard deviations is taken as it is, not averaged.
 const STILL_SIGMAS: f64 = 3.0;
 
+/// A part whose own vertical has turned by more than this was tipped over: there is nothing to average.
+const TIPPED_RAD: f64 = 0.35;
+
 /// What a view of a parameter does to its estimate.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Update {
@@ -105,6 +108,10 @@ fn fuse_part(
 
 /// The mean of two poses weighted by their information, or the seen one if the thing was shifted.
 pub(crate) fn fuse_pose(known: &PoseEstimate, seen: &PoseEstimate, symmetry: YawSymmetry) -> PoseEstimate {
+    let up = |estimate: &PoseEstimate| estimate.pose.transform_vector(DVec3::Z);
+    if up(known).angle_between(up(seen)) > TIPPED_RAD {
+        return *seen;
+    }
     let (from, to) = (known.pose.translation, seen.pose.translation);
     let spread = known.position_sigma_m * known.position_sigma_m + seen.position_sigma_m * seen.position_sigma_m;
     let offset = to - from;
@@ -201,6 +208,20 @@ mod tests {
         let seen = block.clone().turned(std::f64::consts::PI - 0.02);
         let fused = fuse_parts(&block.parts(), &seen.parts(), false, &library).unwrap();
         assert!(fused[0].pose.pose.yaw().abs() < 0.02, "{}", fused[0].pose.pose.yaw());
+    }
+
+    #[test]
+    fn a_tipped_can_is_where_it_is_seen_and_keeps_its_sizes() {
+        let library = default_library().unwrap();
+        let can = Thing::can(0.05, 0.06).at(0.1, 0.2, 0.0);
+        let mut seen = Thing::can(0.052, 0.06).at(0.1, 0.2, 0.05);
+        seen.part.pose.pose.rotation = DQuat::from_rotation_x(std::f64::consts::FRAC_PI_2);
+        let fused = fuse_parts(&can.parts(), &seen.parts(), false, &library).unwrap();
+        assert_eq!(fused[0].pose, seen.part.pose);
+        assert!((fused[0].value("radius").unwrap() - 0.051).abs() < 1e-9);
+        // Half a turn shows the other end of a lying can, and nothing else looks alike.
+        assert_eq!(crate::geometry::symmetry(&fused[0], &library), YawSymmetry::Fold(2));
+        assert_eq!(crate::geometry::symmetry(&can.part, &library), YawSymmetry::Continuous);
     }
 
     proptest! {

@@ -115,7 +115,7 @@ impl Body {
 pub fn symmetry(part: &GroundedPart, library: &TemplateLibrary) -> YawSymmetry {
     library
         .get(&part.template)
-        .and_then(|template| template.yaw_symmetry(&part.values()).ok())
+        .and_then(|template| template.symmetry_at(&part.values(), part.pose.pose.rotation).ok())
         .unwrap_or(YawSymmetry::Fold(1))
 }
 

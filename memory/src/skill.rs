@@ -24,6 +24,10 @@ pub(crate) fn candidates(
     let mut candidates = Vec::new();
     for (index, part) in (0u32..).zip(&entry.parts) {
         let Some(template) = library.get(&part.template) else { continue };
+        // Frames and arguments of functions are written for an upright part.
+        if template.rests.iter().any(|rest| rest.holds(part.up())) {
+            continue;
+        }
         let part_id = PartId { object, index };
         let bind = |name: &str| match name {
             "self" if index == 0 => Some(Term::Object(object)),

@@ -60,6 +60,8 @@ pub(crate) struct Known<'a> {
 /// The expected objects, ray-cast into the frame and compared with it.
 pub(crate) struct Remembered {
     ghosts: Vec<Ghost>,
+    /// The main parts of those that are not seen where they are expected.
+    pub displaced: Vec<GroundedPart>,
 }
 
 /// What one predicted pixel says.
@@ -101,7 +103,9 @@ impl Remembered {
                 solids,
             }
         };
-        Remembered { ghosts: expectation.objects.iter().map(ghost).collect() }
+        let ghosts: Vec<Ghost> = expectation.objects.iter().map(ghost).collect();
+        let elsewhere = ghosts.iter().filter(|ghost| view(ghost).visibility != Visibility::Seen);
+        Remembered { displaced: elsewhere.filter_map(|ghost| ghost.main.clone()).collect(), ghosts }
     }
 
     /// The expected object that explains these pixels (ascending) best, if one explains most of them or is mostly

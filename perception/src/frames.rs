@@ -76,6 +76,21 @@ pub enum ReadFrameError {
         /// Its value.
         value: f64,
     },
+    /// A principal point outside the image: the intrinsics are in another order or of another image size.
+    #[error(
+        "{what} is {value}, but {} has {limit} pixels that way: the intrinsics are fx,fy,cx,cy of this image size",
+        color.display()
+    )]
+    OutsideImage {
+        /// Which number.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+        /// The colour file.
+        color: PathBuf,
+        /// Its width or height.
+        limit: u32,
+    },
     /// A camera pose that is no rigid motion.
     #[error("the camera pose is no rigid motion: its quaternion must have unit length and all numbers must be finite")]
     Pose,
@@ -121,6 +136,11 @@ pub fn read_pair(
     if color_size != depth_size {
         let (color, depth) = (color.to_path_buf(), depth.to_path_buf());
         return Err(ReadFrameError::SizeMismatch { color, color_size, depth, depth_size });
+    }
+    for (what, value, limit) in [("cx", cx, color_size.0), ("cy", cy, color_size.1)] {
+        if value > f64::from(limit) {
+            return Err(ReadFrameError::OutsideImage { what, value, color: color.to_path_buf(), limit });
+        }
     }
     let metres: Vec<f32> = depth_image.into_raw().into_iter().map(|d| (f64::from(d) * depth_scale_m) as f32).collect();
     let (width, height) = color_size;

@@ -106,9 +106,16 @@ impl Grounder {
         let mut segments = segments::split(scene);
         expected::split(scene, remembered, &mut segments);
         expected::merge(remembered, &mut segments);
-        let unremembered =
-            Context { library: &self.library, config: &self.config, nouns: &expectation.nouns, remembered: None };
-        joins::join(scene, &mut segments, unremembered);
+        let unremembered = Context {
+            library: &self.library,
+            config: &self.config,
+            nouns: &expectation.nouns,
+            lying: true,
+            displaced: &remembered.displaced,
+            remembered: None,
+        };
+        // What is hollow or cut in two is told by upright solids alone: they are many, and most are refused.
+        joins::join(scene, &mut segments, Context { lying: false, displaced: &[], ..unremembered });
         let standing: Vec<bool> = segments.labels.iter().map(|label| *label != NONE).collect();
         let context = |remembered| Context { remembered, ..unremembered };
         let (mut objects, mut bodies) = (Vec::new(), Bodies::default());

@@ -1,19 +1,22 @@
 //! Which template a segment is: every template is fitted and the fits are ranked by penalised likelihood, the
 //! template's prior and the words of the instruction.
 
+mod tipped;
+
 use crate::{
     config::GrounderConfig,
-    expected::Known,
+    expected::{Known, solids},
     fit::{Base, Evidence, Minimum, Model, OutlineKind, approach, cost, minimise, rough_cost},
     measure::{self, Rectangle},
 };
 use acm_concept::{
     object::GroundedPart,
-    template::{SeenBy, Template, TemplateLibrary},
+    pose::Pose,
+    template::{Rest, SeenBy, Template, TemplateLibrary},
 };
-use glam::DVec2;
+use glam::{DQuat, DVec2, DVec3, Vec2Swizzles};
 use nalgebra::DMatrix;
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, f64::consts::FRAC_PI_2};
 
 /// What is measured of a segment, and where it stands.
 #[derive(Debug, Clone)]
@@ -33,6 +36,10 @@ pub(crate) struct Context<'a> {
     pub config: &'a GrounderConfig,
     /// Nouns of the instruction.
     pub nouns: &'a [String],
+    /// Whether parts may lie in another rest than upright; it costs time.
+    pub lying: bool,
+    /// The main parts of what memory expects in this frame and does not find in its place.
+    pub displaced: &'a [GroundedPart],
     /// What memory expects here.
     pub remembered: Option<Known<'a>>,
 }
@@ -61,6 +68,10 @@ const TRACKED_CUT: f64 = 0.15;
 /// this much more, are dropped.
 const HOPELESS_FACTOR: f64 = 1.5;
 const HOPELESS_COST: f64 = 25.0;
+/// Before any fit, templates whose best start costs more than this many times the best one's, and this much more, are
+/// dropped.
+const FORLORN_FACTOR: f64 = 4.0;
+const FORLORN_COST: f64 = 100.0;
 /// Starts that are fitted of each template.
 const STARTS: usize = 2;
 
@@ -72,8 +83,21 @@ pub(crate) fn rank<'a>(context: Context<'a>, measured: &Measured, evidence: &Evi
     let rectangles = measure::rectangles(&measured.plan, YAW_STEP, 0.01);
     let circle = measure::circle(&measured.plan);
     let templates = context.library.iter().filter(|template| template.seen_by == measured.seen_by);
-    let near: Vec<Approach> =
-        templates.filter_map(|template| nearest(template, measured, &rectangles, circle, evidence)).collect();
+    // A rest that looks like an upright part of other sizes brings nothing that the upright stance does not.
+    let lying = |rest: &&Rest| context.lying && !rest.like_upright;
+    let stances = templates.flat_map(|template| {
+        let rests = template.rests.iter().filter(lying).map(Some);
+        std::iter::once(None).chain(rests).map(move |rest| (template, rest))
+    });
+    let starts: Vec<Starts> =
+        stances.filter_map(|stance| Starts::of(stance, measured, &rectangles, circle, evidence)).collect();
+    let least = starts.iter().map(|s| s.rough).fold(f64::INFINITY, f64::min);
+    // What is far behind before any fit is not worth a rough one.
+    let near: Vec<Approach> = starts
+        .into_iter()
+        .filter(|s| s.rough < FORLORN_FACTOR * least + FORLORN_COST)
+        .filter_map(|s| s.nearest(evidence))
+        .collect();
     let best = near.iter().map(|a| a.cost).fold(f64::INFINITY, f64::min);
     // What is far behind after the rough fit is not worth a fine one.
     let promising = near.into_iter().filter(|a| a.cost < HOPELESS_FACTOR * best + HOPELESS_COST);
@@ -86,6 +110,9 @@ pub(crate) fn rank<'a>(context: Context<'a>, measured: &Measured, evidence: &Evi
         .collect();
     scored.extend(track(context, measured, &rectangles, evidence));
     scored.sort_by(|a, b| b.0.total_cmp(&a.0));
+    if let Some(other) = scored.first().and_then(|(_, best)| tipped::read_anew(context, best, evidence)) {
+        scored.insert(0, other);
+    }
     let Some(best) = scored.first().map(|(score, _)| *score) else { return Vec::new() };
     // Where even the best fits badly the likelihoods of all are less sure than they look.
     let misfit = scored.first().map_or(1.0, |(_, h)| h.minimum.cost / (0.5 * evidence.independent()).max(1.0));
@@ -99,10 +126,8 @@ pub(crate) fn rank<'a>(context: Context<'a>, measured: &Measured, evidence: &Evi
 /// beginning where it is expected, and no other template is tried.
 fn recognise<'a>(context: Context<'a>, measured: &Measured, evidence: &Evidence) -> Option<Hypothesis<'a>> {
     let Known { part, .. } = context.remembered.filter(|known| known.settled)?;
-    let template = context.library.get(&part.template).filter(|t| t.seen_by == measured.seen_by)?;
-    let values: Vec<f64> = template.parameters.iter().map(|p| part.value(&p.name)).collect::<Option<_>>()?;
-    let model = Model::rigid(template, values, measured.base)?;
-    let start = model.start(part.pose.pose.translation.truncate(), part.pose.pose.yaw());
+    let (model, (at, yaw)) = as_remembered(context, part, measured)?;
+    let start = model.start(at, yaw);
     let minimum = minimise(&model, evidence, &approach(&model, evidence, &start));
     let found = Hypothesis { model, minimum, probability: 1.0, tracked: Some(part) };
     let (on_surface, on_outline) = found.explained(evidence);
@@ -117,38 +142,98 @@ struct Approach<'a> {
     cost: f64,
 }
 
-/// The best of several starts of a template, brought near to a minimum.
-fn nearest<'a>(
-    template: &'a Template,
-    measured: &Measured,
-    rectangles: &[Rectangle],
-    circle: Option<(DVec2, f64)>,
-    evidence: &Evidence,
-) -> Option<Approach<'a>> {
-    let smallest = measure::smallest(rectangles)?;
-    let fallback = (smallest.centre, 0.25 * (smallest.length + smallest.width));
-    let (centre, radius) =
-        circle.filter(|(_, r)| *r < smallest.length && *r > 0.2 * smallest.length).unwrap_or(fallback);
-    let start_at = |rectangle: &Rectangle| {
-        let measures = [rectangle.length, rectangle.width, measured.height_m.max(0.0), radius];
-        let model = Model::new(template, template.initial_values(measures).ok()?, measured.base)?;
-        let at = if model.turns { rectangle.centre } else { centre };
-        let start = model.start(at, rectangle.yaw);
-        Some((rough_cost(&model, evidence, &start), model, start))
-    };
-    let mut starts: Vec<_> = rectangles.iter().filter_map(start_at).collect();
-    // A thing whose two ends differ may lie either way round.
-    let turned = |r: &Rectangle| Rectangle { yaw: r.yaw + std::f64::consts::PI, ..*r };
-    if starts.first().is_some_and(|(_, model, _)| model.has_two_ends()) {
-        starts.extend(rectangles.iter().map(turned).filter_map(|r| start_at(&r)));
+/// The best starts of a template in a stance.
+struct Starts<'a> {
+    starts: Vec<(Model<'a>, Vec<f64>)>,
+    /// Rough cost of the first.
+    rough: f64,
+}
+
+impl<'a> Starts<'a> {
+    fn of(
+        (template, rest): (&'a Template, Option<&'a Rest>),
+        measured: &Measured,
+        rectangles: &[Rectangle],
+        circle: Option<(DVec2, f64)>,
+        evidence: &Evidence,
+    ) -> Option<Starts<'a>> {
+        let smallest = measure::smallest(rectangles)?;
+        let fallback = (smallest.centre, 0.25 * (smallest.length + smallest.width));
+        let (centre, radius) =
+            circle.filter(|(_, r)| *r < smallest.length && *r > 0.2 * smallest.length).unwrap_or(fallback);
+        let height_m = measured.height_m.max(0.0);
+        let start_at = |(rectangle, along): (&Rectangle, DVec2)| {
+            let measures = match rest {
+                None => [rectangle.length, rectangle.width, height_m, radius],
+                Some(rest) => upright_measures(rest, along.extend(height_m)),
+            };
+            let model = Model::new(template, template.initial_values(measures).ok()?, measured.base)?.lying(rest);
+            let at = if model.turns { rectangle.centre } else { centre };
+            // The measures are along the longer side, or across it.
+            let quarter = if along.x < along.y { FRAC_PI_2 } else { 0.0 };
+            let start = model.start(at, rectangle.yaw + quarter);
+            Some((model, start))
+        };
+        // In another rest either side of the rectangle may be the part's own height.
+        let ways = |rectangle| {
+            let sides = |r: &Rectangle| DVec2::new(r.length, r.width);
+            let across = rest.map(|_| (rectangle, sides(rectangle).yx()));
+            std::iter::once((rectangle, sides(rectangle))).chain(across)
+        };
+        let mut starts: Vec<_> = rectangles.iter().flat_map(ways).filter_map(start_at).collect();
+        // A thing whose two ends differ may lie either way round.
+        if starts.first().is_some_and(|(model, _)| model.has_two_ends()) {
+            let turned = |r: &Rectangle| Rectangle { yaw: r.yaw + std::f64::consts::PI, ..*r };
+            let turned: Vec<Rectangle> = rectangles.iter().map(turned).collect();
+            starts.extend(turned.iter().flat_map(ways).filter_map(start_at));
+        }
+        // What is round starts alike in every rectangle.
+        starts.dedup_by(|a, b| a.1 == b.1);
+        let mut rated: Vec<_> =
+            starts.into_iter().map(|(model, start)| (rough_cost(&model, evidence, &start), model, start)).collect();
+        rated.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let (rough, turns) = rated.first().map(|(rough, model, _)| (*rough, model.turns))?;
+        rated.truncate(if turns { STARTS } else { 1 });
+        Some(Starts { starts: rated.into_iter().map(|(_, model, start)| (model, start)).collect(), rough })
     }
-    starts.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let turns = starts.first().is_some_and(|(_, model, _)| model.turns);
-    let near = starts.into_iter().take(if turns { STARTS } else { 1 }).map(|(_, model, start)| {
-        let state = approach(&model, evidence, &start);
-        Approach { cost: cost(&model, evidence, &state), model, state }
-    });
-    near.min_by(|a, b| a.cost.total_cmp(&b.cost))
+
+    /// The best of the starts, brought near to a minimum.
+    fn nearest(self, evidence: &Evidence) -> Option<Approach<'a>> {
+        let near = self.starts.into_iter().map(|(model, start)| {
+            let state = approach(&model, evidence, &start);
+            Approach { cost: cost(&model, evidence, &state), model, state }
+        });
+        near.min_by(|a, b| a.cost.total_cmp(&b.cost))
+    }
+}
+
+/// The measures of a segment as they would be if the part were stood upright, from its extents along the axes of its
+/// rest.
+fn upright_measures(rest: &Rest, extents: DVec3) -> [f64; 4] {
+    let turn = rest.turn();
+    let along = |axis: DVec3| (turn * axis).abs().dot(extents);
+    let (x, y, z) = (along(DVec3::X), along(DVec3::Y), along(DVec3::Z));
+    [x.max(y), x.min(y), z, 0.25 * (x + y)]
+}
+
+/// A model with the parameters and the rest of a remembered part, and the place and heading where it is remembered.
+fn as_remembered<'a>(
+    context: Context<'a>,
+    part: &GroundedPart,
+    measured: &Measured,
+) -> Option<(Model<'a>, (DVec2, f64))> {
+    let template = context.library.get(&part.template).filter(|t| t.seen_by == measured.seen_by)?;
+    let values: Vec<f64> = template.parameters.iter().map(|p| part.value(&p.name)).collect::<Option<_>>()?;
+    let rest = template.rests.iter().find(|rest| rest.holds(part.up()));
+    let model = Model::new(template, values, measured.base)?.lying(rest).rigid();
+    let turn = rest.map_or(DQuat::IDENTITY, |rest| rest.turn());
+    let middle = solids(std::slice::from_ref(part), context.library).iter().map(|s| s.pose.translation).sum::<DVec3>();
+    let place = match rest {
+        None => part.pose.pose.translation,
+        Some(_) => middle / context.library.solids_of(part).map_or(1, |solids| solids.len()).max(1) as f64,
+    };
+    let own = (place.truncate(), Pose::new(DVec3::ZERO, part.pose.pose.rotation * turn.inverse()).yaw());
+    Some((model, own))
 }
 
 /// The remembered part with its remembered parameters, moved to where the evidence is: what is seen of it may be
@@ -160,11 +245,7 @@ fn track<'a>(
     evidence: &Evidence,
 ) -> Option<(f64, Hypothesis<'a>)> {
     let Known { part, .. } = context.remembered.filter(|_| evidence.cut_share() > TRACKED_CUT)?;
-    let template = context.library.get(&part.template).filter(|t| t.seen_by == measured.seen_by)?;
-    let values: Vec<f64> = template.parameters.iter().map(|p| part.value(&p.name)).collect::<Option<_>>()?;
-    let model = Model::rigid(template, values, measured.base)?;
-    let place = part.pose.pose.translation.truncate();
-    let own = (place, part.pose.pose.yaw());
+    let (model, own) = as_remembered(context, part, measured)?;
     let starts = std::iter::once(own).chain(rectangles.iter().map(|r| (r.centre, r.yaw)));
     let rough = |(at, yaw): (DVec2, f64)| {
         let start = model.start(at, yaw);
@@ -210,6 +291,9 @@ fn score(context: Context, model: &Model, minimum: &Minimum, evidence: &Evidence
     let penalty = 0.5 * minimum.state.len() as f64 * evidence.independent().max(2.0).ln();
     let spoken_of = template.nouns(&named).iter().any(|noun| context.nouns.iter().any(|said| said == noun));
     let mut score = -minimum.cost - penalty + template.prior.max(1e-9).ln();
+    if let Some(rest) = model.rest.filter(|rest| !rest.like_upright) {
+        score += rest.prior.max(1e-9).ln();
+    }
     if spoken_of {
         score += context.config.noun_boost.ln();
     }
@@ -260,7 +344,9 @@ pub(crate) fn categories(hypotheses: &[Hypothesis], context: Context) -> Vec<(St
             *nouns.entry(noun).or_insert(0.0) += hypothesis.probability * weight((place, noun)) / total;
         }
     }
-    let mut categories: Vec<(String, f64)> = nouns.into_iter().map(|(noun, p)| (noun.to_string(), p)).collect();
+    // A sum of shares may round to a little over one.
+    let mut categories: Vec<(String, f64)> =
+        nouns.into_iter().map(|(noun, p)| (noun.to_string(), p.min(1.0))).collect();
     categories.sort_by(|a, b| b.1.total_cmp(&a.1));
     categories
 }

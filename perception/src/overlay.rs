@@ -1,22 +1,25 @@
 //! A picture of what was grounded, for a person to judge: outlines, names, wire-frames and sizes.
 
 mod font;
+mod strokes;
 
-use crate::{expected, fit::corners, labels};
+use crate::{expected, labels};
 use acm_concept::{
     camera::RgbdFrame,
-    object::{GroundedObject, Observability, Percepts},
-    pose::Pose,
-    solid::{PlacedSolid, Solid},
+    object::{Blindness, GroundedObject, Observability, Percepts},
+    solid::Solid,
     template::TemplateLibrary,
 };
-use glam::{DVec2, DVec3};
+use font::Font;
 use image::{Rgb, RgbImage};
+use strokes::{Strokes, outline, wire_frame};
 
 /// Draws the frame with every object's outline and fitted solids in a colour of its own, and a line of text with its
 /// name, category, size in centimetres (`~` before sizes that were not observed) and confidence.
 ///
-/// `names` are the labels of the objects, such as their ids; objects without one are numbered.
+/// Edges of a solid that it hides itself are dotted. Every line has a dark rim, so that it shows on any background;
+/// letters and lines grow with the picture. `names` are the labels of the objects, such as their ids; objects without
+/// one are numbered.
 pub fn draw(frame: &RgbdFrame, percepts: &Percepts, names: &[Option<String>], library: &TemplateLibrary) -> RgbImage {
     let (width, height) = (frame.header.intrinsics.width, frame.header.intrinsics.height);
     let mut image =
@@ -26,13 +29,15 @@ pub fn draw(frame: &RgbdFrame, percepts: &Percepts, names: &[Option<String>], li
         pixel.0 = pixel.0.map(|value| (u16::from(value) * 3 / 5 + 30) as u8);
     }
     let owners = labels::draw(percepts);
+    let mut strokes = Strokes::new(width, height, scale(&image));
     for (index, object) in percepts.objects.iter().enumerate() {
         let color = PALETTE[index % PALETTE.len()];
-        outline(&mut image, &owners, index as u16 + 1, color);
+        outline(&mut strokes, &owners, index as u16 + 1, color);
         for solid in expected::solids(&object.parts, library) {
-            wire_frame(&mut image, percepts, &solid, color);
+            wire_frame(&mut strokes, percepts, &solid, color);
         }
     }
+    strokes.paint(&mut image);
     let boxes: Vec<[i64; 4]> = percepts.objects.iter().map(|o| o.support.bounds.map(i64::from)).collect();
     let mut taken: Vec<[i64; 4]> = Vec::new();
     for (index, object) in percepts.objects.iter().enumerate() {
@@ -43,9 +48,35 @@ pub fn draw(frame: &RgbdFrame, percepts: &Percepts, names: &[Option<String>], li
         taken.push(place);
     }
     if let Some(blindness) = percepts.blindness {
-        font::text(&mut image, 8, 8, &format!("blind: {blindness:?}"), Rgb([255, 80, 80]));
+        let reason = match blindness {
+            Blindness::NoDepth => "blind: no depth",
+            Blindness::NoColor => "blind: the colour image is black",
+            Blindness::NoSupport => "blind: no surface on which things could stand",
+        };
+        note(&mut image, &[reason.into()]);
     }
     image
+}
+
+/// Writes lines into the lower left corner of a picture, such as the names of what is not in it.
+pub fn note(image: &mut RgbImage, lines: &[String]) {
+    if lines.is_empty() {
+        return;
+    }
+    let font = Font { scale: scale(image) };
+    let width = lines.iter().map(|line| font.width(line)).max().unwrap_or(0) + 4 * font.scale;
+    let height = lines.len() as i64 * font.line() + 3 * font.scale;
+    let top = i64::from(image.height()) - height;
+    plate(image, [0, top, width, top + height]);
+    for (index, text) in lines.iter().enumerate() {
+        let at = top + 2 * font.scale + index as i64 * font.line();
+        font.write(image, 2 * font.scale, at, text, Rgb([255, 255, 255]));
+    }
+}
+
+/// Pixels a dot: 1 up to 960 columns, 2 for full HD.
+fn scale(image: &RgbImage) -> i64 {
+    ((i64::from(image.width()) + 320) / 640).clamp(1, 6)
 }
 
 const PALETTE: [Rgb<u8>; 10] = [
@@ -80,52 +111,6 @@ fn size_text(object: &GroundedObject, library: &TemplateLibrary) -> String {
     format!("{mark}{size}cm {:.0}%", object.confidence * 100.0)
 }
 
-fn outline(image: &mut RgbImage, owners: &labels::LabelImage, label: u16, color: Rgb<u8>) {
-    let (width, height) = image.dimensions();
-    for row in 1..height.saturating_sub(1) {
-        for column in 1..width.saturating_sub(1) {
-            let own = |x: u32, y: u32| owners.get_pixel(x, y).0[0] == label;
-            let around = [(column - 1, row), (column + 1, row), (column, row - 1), (column, row + 1)];
-            // A lone foreign pixel is a hole in the depth, not a border.
-            let is_hole = |x: u32, y: u32| {
-                let near = [(x.wrapping_sub(1), y), (x + 1, y), (x, y.wrapping_sub(1)), (x, y + 1)];
-                near.iter().filter(|&&(x, y)| x < width && y < height && own(x, y)).count() >= 3
-            };
-            if own(column, row) && around.iter().any(|&(x, y)| !own(x, y) && !is_hole(x, y)) {
-                blend(image, i64::from(column), i64::from(row), color, 0.7);
-            }
-        }
-    }
-}
-
-fn wire_frame(image: &mut RgbImage, percepts: &Percepts, solid: &PlacedSolid, color: Rgb<u8>) {
-    let to_camera = percepts.frame.camera_pose.inverse() * solid.pose;
-    let corners = corners(&solid.solid);
-    let count = corners.len();
-    let edges: Vec<(usize, usize)> = match solid.solid {
-        Solid::Box { .. } => {
-            (0..8).flat_map(|i: usize| [1, 2, 4].map(|bit| (i, i | bit))).filter(|(a, b)| a != b).collect()
-        }
-        // Even corners are the lower rim, odd ones the upper; a few uprights join them.
-        Solid::Cylinder { .. } => {
-            (0..count).map(|i| (i, (i + 2) % count)).chain((0..count).step_by(12).map(|i| (i, i + 1))).collect()
-        }
-    };
-    for (a, b) in edges {
-        line(image, percepts, &to_camera, corners[a], corners[b], color);
-    }
-}
-
-fn line(image: &mut RgbImage, percepts: &Percepts, to_camera: &Pose, a: DVec3, b: DVec3, color: Rgb<u8>) {
-    let project = |p: DVec3| percepts.frame.intrinsics.project(to_camera.transform_point(p));
-    let (Some(a), Some(b)) = (project(a), project(b)) else { return };
-    let steps = (a.distance(b) * 1.5).clamp(1.0, 6000.0) as usize;
-    for step in 0..=steps {
-        let at: DVec2 = a.lerp(b, step as f64 / steps as f64);
-        blend(image, at.x.round() as i64, at.y.round() as i64, color, 0.9);
-    }
-}
-
 fn blend(image: &mut RgbImage, column: i64, row: i64, color: Rgb<u8>, share: f32) {
     let (Ok(column), Ok(row)) = (u32::try_from(column), u32::try_from(row)) else { return };
     if let Some(pixel) = image.get_pixel_mut_checked(column, row) {
@@ -144,8 +129,9 @@ fn place_of(
     objects: &[[i64; 4]],
     taken: &[[i64; 4]],
 ) -> [i64; 4] {
-    let width = lines.iter().map(|line| font::width(line)).max().unwrap_or(0) + 4;
-    let height = lines.len() as i64 * font::LINE + 3;
+    let font = Font { scale: scale(image) };
+    let width = lines.iter().map(|line| font.width(line)).max().unwrap_or(0) + 4 * font.scale;
+    let height = lines.len() as i64 * font.line() + 3 * font.scale;
     let (middle, centre) = ((object[0] + object[2]) / 2, (object[1] + object[3]) / 2);
     let mut best = (i64::MAX, [0; 4]);
     for step in 0..12i64 {
@@ -189,12 +175,22 @@ fn caption(image: &mut RgbImage, place: [i64; 4], lines: &[String], object: [i64
         let at = |axis: usize| from[axis] + (end[axis] - from[axis]) * step / steps;
         blend(image, at(0), at(1), color, 0.8);
     }
-    for row in top..bottom {
-        for column in left..right {
-            blend(image, column, row, Rgb([0, 0, 0]), 0.65);
-        }
-    }
+    plate(image, place);
+    let font = Font { scale: scale(image) };
     for (index, text) in lines.iter().enumerate() {
-        font::text(image, left + 2, top + 2 + index as i64 * font::LINE, text, color);
+        let at = top + 2 * font.scale + index as i64 * font.line();
+        font.write(image, left + 2 * font.scale, at, text, color);
     }
 }
+
+/// Darkens a rectangle so that letters show on it.
+fn plate(image: &mut RgbImage, [left, top, right, bottom]: [i64; 4]) {
+    for row in top..bottom {
+        for column in left..right {
+            blend(image, column, row, Rgb([0, 0, 0]), 0.75);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

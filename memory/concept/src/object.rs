@@ -70,6 +70,10 @@ impl GroundedPart {
     pub fn values(&self) -> Vec<(&str, f64)> {
         self.parameters.iter().map(|p| (p.name.as_str(), p.value)).collect()
     }
+    /// The direction of the part's own frame that points up: z for an upright part.
+    pub fn up(&self) -> DVec3 {
+        self.pose.pose.rotation.inverse() * DVec3::Z
+    }
     /// One parameter's value.
     pub fn value(&self, name: &str) -> Option<f64> {
         self.parameters.iter().find(|p| p.name == name).map(|p| p.value)

@@ -50,9 +50,21 @@ impl Pose {
     pub fn transform_vector(&self, vector: DVec3) -> DVec3 {
         self.rotation * vector
     }
-    /// Heading of the frame's x axis seen from above, radians in (-pi, pi].
+    /// Heading of the frame's x axis seen from above, radians in (-pi, pi]; of its y axis less a quarter turn where x
+    /// points straight up or down and has none.
+    ///
+    /// ```
+    /// # use acm_concept::pose::Pose;
+    /// # use glam::{DQuat, DVec3};
+    /// let on_end = DQuat::from_rotation_z(0.4) * DQuat::from_rotation_y(-std::f64::consts::FRAC_PI_2);
+    /// assert!((Pose::new(DVec3::ZERO, on_end).yaw() - 0.4).abs() < 1e-9);
+    /// ```
     pub fn yaw(&self) -> f64 {
         let x = self.rotation * DVec3::X;
+        if x.truncate().length() < 0.05 {
+            let y = self.rotation * DVec3::Y;
+            return (-y.x).atan2(y.y);
+        }
         x.y.atan2(x.x)
     }
     /// Angle of the shortest rotation to `other`, radians in [0, pi].

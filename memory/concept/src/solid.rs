@@ -125,19 +125,31 @@ impl PlacedSolid {
     pub fn signed_distance(&self, point: DVec3) -> f64 {
         self.solid.signed_distance(self.pose.inverse().transform_point(point))
     }
-    /// Half of the extents along the parent's axes of the box round the turned solid. Metres.
+    /// Half of the extents, along the parent's axes, of the smallest box round the solid. Metres.
     ///
     /// ```
     /// # use acm_concept::{pose::Pose, solid::{PlacedSolid, Solid}};
-    /// # use glam::DVec3;
-    /// let bar = Solid::Box { size: DVec3::new(0.2, 0.04, 0.02) };
-    /// let turned = PlacedSolid { solid: bar, pose: Pose::from_yaw(DVec3::ZERO, std::f64::consts::FRAC_PI_2) };
-    /// assert!((turned.half_extents() - DVec3::new(0.02, 0.1, 0.01)).length() < 1e-12);
+    /// # use glam::{DQuat, DVec3};
+    /// let turn = DQuat::from_rotation_x(std::f64::consts::FRAC_PI_2);
+    /// let lying = PlacedSolid {
+    ///     solid: Solid::Cylinder { radius: 0.03, height: 0.1 },
+    ///     pose: Pose::new(DVec3::ZERO, turn),
+    /// };
+    /// assert!(lying.half_extents().distance(DVec3::new(0.03, 0.05, 0.03)) < 1e-12);
     /// ```
     pub fn half_extents(&self) -> DVec3 {
-        let half = self.solid.half_extents();
-        let axis = |unit: DVec3, length: f64| self.pose.transform_vector(unit).abs() * length;
-        axis(DVec3::X, half.x) + axis(DVec3::Y, half.y) + axis(DVec3::Z, half.z)
+        let axis = |unit: DVec3| self.pose.transform_vector(unit);
+        match self.solid {
+            Solid::Box { size } => {
+                let half = size * 0.5;
+                axis(DVec3::X).abs() * half.x + axis(DVec3::Y).abs() * half.y + axis(DVec3::Z).abs() * half.z
+            }
+            Solid::Cylinder { radius, height } => {
+                let along = axis(DVec3::Z);
+                let round = (DVec3::ONE - along * along).max(DVec3::ZERO).map(f64::sqrt);
+                round * radius + along.abs() * (0.5 * height)
+            }
+        }
     }
     /// As [`Solid::intersect_ray`], with the ray in the parent frame.
     pub fn intersect_ray(&self, origin: DVec3, direction: DVec3) -> Option<(f64, f64)> {

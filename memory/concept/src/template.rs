@@ -5,6 +5,9 @@
 //! format is described in docs/templates.md.
 
 mod raw;
+mod rest;
+
+pub use rest::Rest;
 
 use crate::{
     expression::{Expression, ExpressionError},
@@ -12,7 +15,7 @@ use crate::{
     pose::Pose,
     solid::{PlacedSolid, Solid},
 };
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use thiserror::Error;
@@ -213,6 +216,8 @@ pub struct Template {
     solids: Vec<SolidSpec>,
     frames: Vec<FrameSpec>,
     symmetry: Vec<SymmetryRule>,
+    /// Ways to come to rest besides upright on its bottom.
+    pub rests: Vec<Rest>,
     /// Manipulation functions F.
     pub functions: Vec<FunctionBinding>,
 }
@@ -339,6 +344,15 @@ impl Template {
             }
         }
         Ok(YawSymmetry::Fold(1))
+    }
+    /// The symmetry about the vertical of a part that is turned by `rotation` from its upright stance: that of the
+    /// rest in which it is, none for a stance that the template does not name.
+    pub fn symmetry_at(&self, values: &Values, rotation: DQuat) -> Result<YawSymmetry, ExpressionError> {
+        let up = rotation.inverse() * DVec3::Z;
+        if up.z > rest::NEAR_COSINE {
+            return self.yaw_symmetry(values);
+        }
+        Ok(self.rests.iter().find(|rest| rest.holds(up)).map_or(YawSymmetry::Fold(1), |rest| rest.symmetry))
     }
     /// The nouns that fit the given parameter values, the most specific first.
     pub fn nouns(&self, values: &Values) -> Vec<&str> {

@@ -68,7 +68,8 @@ impl<'a> Percept<'a> {
         let sane = (0.0..=1.0).contains(&object.confidence)
             && color_is_finite(&object.appearance)
             && parts.iter().all(part_is_finite)
-            && object.categories.iter().all(|(_, probability)| (0.0..=1.0).contains(probability));
+            // Sums of probabilities round to a little over one.
+            && object.categories.iter().all(|(_, probability)| (0.0..=1.0 + 1e-9).contains(probability));
         let body = sane.then(|| Body::of(&parts, library)).flatten()?;
         let pose = parts.first()?.pose;
         Some(Percept { index, object, parts, pose, body })

@@ -5,7 +5,7 @@ use crate::scene::{convex_hull, distance_outside};
 use acm_concept::{
     pose::Pose,
     solid::{PlacedSolid, Solid},
-    template::{Template, YawSymmetry},
+    template::{Rest, Template, YawSymmetry},
 };
 use glam::{DVec2, DVec3};
 
@@ -20,6 +20,9 @@ pub(crate) enum Base {
 
 /// A template whose free quantities are laid out in a state vector:
 /// x, y, heading (unless any heading looks the same), base height (if free), fitted parameters.
+///
+/// Of an upright part x and y are those of its base frame. In another rest they are the middle of what it covers, and the
+/// base height is that of its lowest point: the base frame itself moves when sizes change.
 #[derive(Debug, Clone)]
 pub(crate) struct Model<'a> {
     pub template: &'a Template,
@@ -28,6 +31,8 @@ pub(crate) struct Model<'a> {
     /// Whether half a turn makes a difference.
     two_ends: bool,
     pub base: Base,
+    /// How it lies; `None` for upright.
+    pub rest: Option<&'a Rest>,
     /// Indices of the fitted parameters.
     free: Vec<usize>,
     /// All parameter values; those of fitted parameters are replaced by the state.
@@ -52,12 +57,16 @@ impl<'a> Model<'a> {
         let symmetry = template.yaw_symmetry(&template.named(&initial)).ok()?;
         let free = (0..template.parameters.len()).filter(|&i| !template.parameters[i].fixed).collect();
         let two_ends = matches!(symmetry, YawSymmetry::Fold(fold) if fold % 2 == 1);
-        Some(Model { template, turns: symmetry != YawSymmetry::Continuous, two_ends, base, free, initial })
+        Some(Model { template, turns: symmetry != YawSymmetry::Continuous, two_ends, base, rest: None, free, initial })
     }
-    /// A model whose parameters stay at `values`: only its place is fitted.
-    pub fn rigid(template: &'a Template, values: Vec<f64>, base: Base) -> Option<Model<'a>> {
-        let model = Model::new(template, values, base)?;
-        Some(Model { free: Vec::new(), ..model })
+    /// The model in another rest.
+    pub fn lying(self, rest: Option<&'a Rest>) -> Model<'a> {
+        let Some(rest) = rest else { return self };
+        Model { rest: Some(rest), turns: rest.symmetry != YawSymmetry::Continuous, ..self }
+    }
+    /// The model with its parameters as they are: only its place is fitted.
+    pub fn rigid(self) -> Model<'a> {
+        Model { free: Vec::new(), ..self }
     }
     /// Whether half a turn makes a difference.
     pub fn has_two_ends(&self) -> bool {
@@ -101,7 +110,24 @@ impl<'a> Model<'a> {
                 values[parameter] = state[i];
             }
         }
-        Placement { pose: Pose::from_yaw(DVec3::new(state[0], state[1], height), yaw), values }
+        let upright = Pose::from_yaw(DVec3::new(state[0], state[1], height), yaw);
+        let pose = self.rest.map_or(upright, |rest| upright * self.laid_down(rest, &values));
+        Placement { pose, values }
+    }
+    /// The base frame of a part in a rest, seen from the middle of what it covers on its support.
+    fn laid_down(&self, rest: &Rest, values: &[f64]) -> Pose {
+        let turn = Pose::new(DVec3::ZERO, rest.turn());
+        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for solid in self.template.solids(&self.template.named(values)).unwrap_or_default() {
+            let turned = PlacedSolid { solid: solid.solid, pose: turn * solid.pose };
+            let half = turned.half_extents();
+            (low, high) = (low.min(turned.pose.translation - half), high.max(turned.pose.translation + half));
+        }
+        if !(low.is_finite() && high.is_finite()) {
+            return turn;
+        }
+        let middle = (low + high) * 0.5;
+        Pose::new(-middle.with_z(low.z), turn.rotation)
     }
     /// Moves fitted parameters into their ranges.
     pub fn clamp(&self, state: &mut [f64]) {

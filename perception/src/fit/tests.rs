@@ -120,7 +120,34 @@ fn the_state_maps_onto_the_parameters() {
     assert_eq!((model.yaw_index(), model.base_index(), model.parameter_index(2)), (Some(2), Some(3), Some(6)));
     let placement = model.placement(&state);
     assert!(placement.pose.translation.distance(DVec3::new(1.0, 2.0, 0.3)) < 1e-12);
-    let rigid = Model::rigid(&template, vec![0.2, 0.1, 0.05], Base::At(0.0)).unwrap();
+    let rigid = Model::new(&template, vec![0.2, 0.1, 0.05], Base::At(0.0)).unwrap().rigid();
     assert_eq!(rigid.start(DVec2::ZERO, 0.5).len(), 3);
     assert_eq!(rigid.placement(&[0.0, 0.0, 0.0]).values, [0.2, 0.1, 0.05]);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(8))]
+    #[test]
+    fn a_can_on_its_side_is_recovered_from_a_rough_start(
+        radius in 0.03..0.1f64, height in 0.05..0.15f64, yaw in -0.9..0.9f64, off in -0.01..0.01f64,
+    ) {
+        let template = Template::parse("cylinder.toml", CYLINDER).unwrap();
+        let rest = &template.rests[0];
+        let rotation = DQuat::from_rotation_z(yaw) * rest.turn();
+        let solid = PlacedSolid {
+            solid: Solid::Cylinder { radius, height },
+            pose: Pose::new(DVec3::new(0.02, -0.01, radius), rotation),
+        };
+        let evidence = evidence(&solid, camera(0.8), 0.002);
+        let model = Model::new(&template, vec![radius * 1.1, height * 0.9], Base::At(0.0)).unwrap().lying(Some(rest));
+        let start = approach(&model, &evidence, &model.start(DVec2::new(0.02 + off, -0.01 - off), yaw + 0.15));
+        let minimum = minimise(&model, &evidence, &start);
+        let found = model.placement(&minimum.state);
+        prop_assert!((found.values[0] - radius).abs() < 0.003 && (found.values[1] - height).abs() < 0.004, "{:?}", found.values);
+        // It lies on the plane, and the base frame is where its bottom is: at one end of the axis.
+        let [placed] = model.solids(&minimum.state)[..] else { panic!("one solid") };
+        prop_assert!(placed.pose.translation.distance(solid.pose.translation) < 0.004, "{placed:?}");
+        let end = solid.pose.transform_point(DVec3::new(0.0, 0.0, -height / 2.0));
+        prop_assert!(found.pose.translation.distance(end) < 0.006, "{} for {end}", found.pose.translation);
+    }
 }

@@ -8,7 +8,7 @@ use crate::{
 use acm_concept::{
     object::{GroundedObject, GroundedPart, Observability, ParameterEstimate, PixelSupport, PoseEstimate},
     pose::Pose,
-    template::{PartSpec, Unit, YawSymmetry},
+    template::{PartSpec, Unit},
 };
 use glam::{DQuat, DVec2, DVec3};
 
@@ -41,7 +41,8 @@ pub(super) fn object(
     // What is cut off all round may be anything.
     let whole = 1.0 - 0.6 * evidence.cut_share();
     let explained = on_surface * (0.4 + 0.6 * on_outline) * whole;
-    let parts = parts(scene, best, evidence, appearance)?;
+    let remembered = context.remembered.map(|known| known.part);
+    let parts = parts(scene, best, evidence, appearance, remembered)?;
     Some(GroundedObject {
         category: category.clone(),
         categories,
@@ -67,12 +68,11 @@ fn parts(
     hypothesis: &Hypothesis,
     evidence: &Evidence,
     appearance: acm_concept::color::Appearance,
+    remembered: Option<&GroundedPart>,
 ) -> Option<Vec<GroundedPart>> {
     let (model, minimum) = (&hypothesis.model, &hypothesis.minimum);
     let template = model.template;
     let placement = model.placement(&minimum.state);
-    let named = template.named(&placement.values);
-    let symmetry = template.yaw_symmetry(&named).ok()?;
     let calibration = Calibration::new(scene, &scene.world.transform_point(placement.pose.translation));
     let deviation = |index: usize| deviation(hypothesis, index);
     let (parameters, drift_m) = match hypothesis.tracked {
@@ -87,15 +87,14 @@ fn parts(
             (measured_parameters(hypothesis, &profile, &calibration), profile.drift_m)
         }
     };
-    let reach =
-        model.solids(&minimum.state).iter().map(|s| s.solid.half_extents().truncate().length()).fold(0.01, f64::max);
+    let reach = model.solids(&minimum.state).iter().map(|s| s.half_extents().truncate().length()).fold(0.01, f64::max);
     let position_sigma_m = DVec3::new(
         calibration.length(deviation(0)).hypot(drift_m.x),
         calibration.length(deviation(1)).hypot(drift_m.y),
         calibration.length(model.base_index().map_or(0.0, deviation)),
     );
     let yaw_sigma_rad = model.yaw_index().map_or(0.01, |i| calibration.angle(deviation(i), reach));
-    let base = world_pose(scene, &placement.pose, symmetry);
+    let base = world_pose(scene, hypothesis, remembered)?;
     let part = |(index, (spec, frame)): (usize, (&PartSpec, Pose))| GroundedPart {
         template: template.name.clone(),
         name: spec.name.clone(),
@@ -105,7 +104,7 @@ fn parts(
         functions: if index == 0 { template.functions.iter().map(|f| f.name.clone()).collect() } else { Vec::new() },
         appearance,
     };
-    let frames = template.part_frames(&named).ok()?;
+    let frames = template.part_frames(&template.named(&placement.values)).ok()?;
     Some(template.parts.iter().zip(frames).enumerate().map(part).collect())
 }
 
@@ -135,17 +134,38 @@ fn measured_parameters(
     profile.parameters.iter().enumerate().map(estimate).collect()
 }
 
-/// The pose in the world, with the heading nearest to zero among the equivalent ones. A small tilt of the plane is
-/// calibration error: the part is then reported exactly upright.
-fn world_pose(scene: &Scene, pose: &Pose, symmetry: YawSymmetry) -> Pose {
-    let world = scene.world * *pose;
-    let yaw = symmetry.nearest(world.yaw(), 0.0);
-    let upright = Pose::from_yaw(world.translation, yaw);
+/// The pose in the world. Among equivalent headings it is the one nearest to zero; of a part that lies as memory knows
+/// it the one nearest to the remembered, because there the base frame sits at one end. A small tilt of the plane is
+/// calibration error: the part is then reported as exactly upright, or exactly in its rest.
+fn world_pose(scene: &Scene, hypothesis: &Hypothesis, remembered: Option<&GroundedPart>) -> Option<Pose> {
+    let model = &hypothesis.model;
+    let mut state = hypothesis.minimum.state.clone();
+    let turn = model.rest.map_or(DQuat::IDENTITY, |rest| rest.turn());
+    // Heading of the part as if it were stood upright.
+    let heading = |pose: &Pose| Pose::new(DVec3::ZERO, pose.rotation * turn.inverse()).yaw();
+    let placed = |state: &[f64]| scene.world * model.placement(state).pose;
+    let placement = model.placement(&state);
+    let named = model.template.named(&placement.values);
+    let symmetry = match model.rest {
+        Some(rest) => rest.symmetry,
+        None => model.template.yaw_symmetry(&named).ok()?,
+    };
+    let same_rest = |part: &&GroundedPart| {
+        part.template == model.template.name && model.rest.is_some_and(|rest| rest.holds(part.up()))
+    };
+    let reference = remembered.filter(same_rest).map_or(0.0, |part| heading(&part.pose.pose));
+    let fitted = heading(&placed(&state));
+    let yaw = symmetry.nearest(fitted, reference);
+    if let Some(index) = model.yaw_index() {
+        state[index] += yaw - fitted;
+    }
+    let world = placed(&state);
+    let upright = DQuat::from_rotation_z(yaw) * turn;
     let normal = scene.world.transform_vector(DVec3::Z);
     if normal.angle_between(DVec3::Z) <= scene.config.upright_tolerance_rad {
-        return upright;
+        return Some(Pose::new(world.translation, upright));
     }
-    Pose::new(upright.translation, DQuat::from_rotation_arc(DVec3::Z, normal) * upright.rotation)
+    Some(Pose::new(world.translation, DQuat::from_rotation_arc(DVec3::Z, normal) * upright))
 }
 
 /// Turns the standard deviations of a fit into honest ones: sigma^2 = (k sigma_fit)^2 + floor^2 + (share z)^2.

@@ -22,7 +22,7 @@ impl Bodies {
     pub fn add(&mut self, ranked: &[Hypothesis]) {
         let Some(best) = ranked.first() else { return };
         let solids = best.model.solids(&best.minimum.state);
-        let top = solids.iter().map(|s| s.pose.translation.z + s.solid.half_extents().z).fold(0.0, f64::max);
+        let top = solids.iter().map(|s| s.pose.translation.z + s.half_extents().z).fold(0.0, f64::max);
         self.tops.push((solids, top));
     }
 

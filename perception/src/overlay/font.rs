@@ -2,25 +2,42 @@
 
 use image::{Rgb, RgbImage};
 
-/// Distance between lines, pixels.
-pub(super) const LINE: i64 = 10;
+/// Distance between lines, dots.
+const LINE: i64 = 10;
 const ADVANCE: i64 = 6;
 
-/// Width of a text in pixels.
-pub(super) fn width(text: &str) -> i64 {
-    text.chars().count() as i64 * ADVANCE
+/// Letters whose dots are `scale` pixels wide and high, so that they can be read in large pictures too.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Font {
+    pub scale: i64,
 }
 
-/// Writes a text with its upper left corner at a pixel; small letters are drawn as capitals, unknown signs as blanks.
-pub(super) fn text(image: &mut RgbImage, left: i64, top: i64, text: &str, color: Rgb<u8>) {
-    for (place, sign) in text.chars().enumerate() {
-        for (row, bits) in rows(sign.to_ascii_uppercase()).into_iter().enumerate() {
-            for column in (0..5).filter(|column| bits & (0x10 >> column) != 0) {
-                let at = (left + place as i64 * ADVANCE + column, top + row as i64);
-                let (Ok(x), Ok(y)) = (u32::try_from(at.0), u32::try_from(at.1)) else { continue };
-                if let Some(pixel) = image.get_pixel_mut_checked(x, y) {
-                    *pixel = color;
+impl Font {
+    /// Distance between lines, pixels.
+    pub fn line(self) -> i64 {
+        LINE * self.scale
+    }
+    /// Width of a text in pixels.
+    pub fn width(self, text: &str) -> i64 {
+        text.chars().count() as i64 * ADVANCE * self.scale
+    }
+    /// Writes a text with its upper left corner at a pixel; small letters are drawn as capitals, unknown signs as
+    /// blanks.
+    pub fn write(self, image: &mut RgbImage, left: i64, top: i64, text: &str, color: Rgb<u8>) {
+        for (place, sign) in text.chars().enumerate() {
+            for (row, bits) in rows(sign.to_ascii_uppercase()).into_iter().enumerate() {
+                for column in (0..5).filter(|column| bits & (0x10 >> column) != 0) {
+                    let at = (place as i64 * ADVANCE + column, row as i64);
+                    self.dot(image, left + at.0 * self.scale, top + at.1 * self.scale, color);
                 }
+            }
+        }
+    }
+    fn dot(self, image: &mut RgbImage, left: i64, top: i64, color: Rgb<u8>) {
+        for (x, y) in (0..self.scale).flat_map(|y| (0..self.scale).map(move |x| (left + x, top + y))) {
+            let (Ok(x), Ok(y)) = (u32::try_from(x), u32::try_from(y)) else { continue };
+            if let Some(pixel) = image.get_pixel_mut_checked(x, y) {
+                *pixel = color;
             }
         }
     }

@@ -25,6 +25,8 @@ struct RawTemplate {
     #[serde(default)]
     symmetry: Vec<RawSymmetry>,
     #[serde(default)]
+    rest: Vec<RawRest>,
+    #[serde(default)]
     function: Vec<RawFunction>,
 }
 
@@ -93,6 +95,33 @@ struct RawSymmetry {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
+struct RawRest {
+    up: RawAxis,
+    #[serde(default = "one_fold")]
+    fold: u32,
+    #[serde(default = "seldom")]
+    prior: f64,
+    #[serde(default)]
+    like_upright: bool,
+}
+
+/// An axis of the base frame.
+#[derive(Clone, Copy, Deserialize)]
+enum RawAxis {
+    #[serde(rename = "x")]
+    X,
+    #[serde(rename = "-x")]
+    MinusX,
+    #[serde(rename = "y")]
+    Y,
+    #[serde(rename = "-y")]
+    MinusY,
+    #[serde(rename = "-z")]
+    MinusZ,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
 struct RawFunction {
     name: String,
     kind: String,
@@ -107,6 +136,13 @@ struct RawFunction {
 
 fn one() -> f64 {
     1.0
+}
+fn one_fold() -> u32 {
+    1
+}
+/// Odds of a rest whose file does not give them.
+fn seldom() -> f64 {
+    0.2
 }
 fn zero() -> String {
     "0".into()
@@ -168,6 +204,7 @@ impl Meaning<'_> {
             parts,
             functions: raw.function.iter().map(|f| self.function(f, &frames)).collect::<Result<_, _>>()?,
             symmetry: symmetry.collect::<Result<_, _>>()?,
+            rests: raw.rest.iter().map(|rest| self.rest(rest)).collect::<Result<_, _>>()?,
             frames,
         })
     }
@@ -269,6 +306,22 @@ impl Meaning<'_> {
         let place = format!("frame `{}`", raw.name);
         let (position, yaw) = (self.triple(&place, &raw.position)?, self.expression(&place, &raw.yaw)?);
         Ok(FrameSpec { name: raw.name.clone(), position, yaw })
+    }
+
+    fn rest(&self, raw: &RawRest) -> Result<Rest, TemplateError> {
+        if !(raw.prior.is_finite() && raw.prior > 0.0) {
+            let reason = format!("rest: prior {} must be a positive number", raw.prior);
+            return Err(TemplateError::Format { file: self.file.into(), reason });
+        }
+        let up = match raw.up {
+            RawAxis::X => DVec3::X,
+            RawAxis::MinusX => DVec3::NEG_X,
+            RawAxis::Y => DVec3::Y,
+            RawAxis::MinusY => DVec3::NEG_Y,
+            RawAxis::MinusZ => DVec3::NEG_Z,
+        };
+        let symmetry = if raw.fold == 0 { YawSymmetry::Continuous } else { YawSymmetry::Fold(raw.fold) };
+        Ok(Rest { up, symmetry, prior: raw.prior, like_upright: raw.like_upright })
     }
 
     fn function(&self, raw: &RawFunction, frames: &[FrameSpec]) -> Result<FunctionBinding, TemplateError> {

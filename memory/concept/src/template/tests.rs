@@ -1,4 +1,5 @@
 use super::*;
+use glam::{DQuat, DVec3};
 
 const PUCK: &str = r#"
 template = "puck"
@@ -75,4 +76,23 @@ fn a_type_may_be_declared_once() {
     assert!(matches!(twice, Err(TemplateError::Duplicate { file, .. }) if file == "b.toml"));
     let library = TemplateLibrary::parse([("a.toml", PUCK)]).unwrap();
     assert_eq!(library.with_noun("coaster").count(), 1);
+}
+
+#[test]
+fn a_rest_turns_the_part_and_has_its_own_symmetry() {
+    let text = format!("{PUCK}[[rest]]\nup = \"y\"\nfold = 2\n");
+    let puck = Template::parse("puck.toml", &text).unwrap();
+    let [rest] = puck.rests[..] else { panic!("one rest") };
+    assert!((rest.turn() * DVec3::Y).distance(DVec3::Z) < 1e-12);
+    assert_eq!((rest.prior, rest.like_upright), (0.2, false));
+    let values = [("radius", 0.03), ("height", 0.02)];
+    let symmetry = |rotation: DQuat| puck.symmetry_at(&values, rotation).unwrap();
+    let heading = DQuat::from_rotation_z(0.7);
+    assert_eq!(symmetry(heading), YawSymmetry::Continuous);
+    assert_eq!(symmetry(heading * rest.turn()), YawSymmetry::Fold(2));
+    assert_eq!(symmetry(heading * DQuat::from_rotation_y(1.5)), YawSymmetry::Fold(1));
+    let refused =
+        |rest: &str| Template::parse("puck.toml", &format!("{PUCK}[[rest]]\n{rest}\n")).unwrap_err().to_string();
+    assert!(refused("up = \"z\"").contains("`z`"));
+    assert!(refused("up = \"x\"\nprior = 0.0").contains("prior 0"));
 }
