@@ -1,6 +1,7 @@
 """A robot for `acm run --robot tcp://127.0.0.1:7401`, in nothing but the standard library: a block, a mat and a hand.
 
-Camera and hand look straight down (half a turn about x), so a picture is a pile of rectangles. docs/robot-protocol.md explains each message.
+Camera and hand look straight down (half a turn about x), so a picture is a pile of rectangles.
+docs/robot-protocol.md explains each message.
 """
 import array, json, socket, sys
 
