@@ -1,13 +1,13 @@
 """A robot for `acm run --robot tcp://127.0.0.1:7401`, in nothing but the standard library: a block, a mat and a hand.
 
-The camera looks straight down, so a picture is a pile of rectangles. docs/robot-protocol.md explains each message.
+Camera and hand look straight down (half a turn about x), so a picture is a pile of rectangles.
+docs/robot-protocol.md explains each message.
 """
 import array, json, socket, sys
 
 WIDTH, HEIGHT, FOCAL, EYE, TABLE, SIDE = 320, 240, 260.0, 1.24, 0.74, 0.05
 LENS = {"width": WIDTH, "height": HEIGHT, "fx": FOCAL, "fy": FOCAL, "cx": WIDTH / 2 - 0.5, "cy": HEIGHT / 2 - 0.5}
-VIEW = {"translation": [0.0, 0.0, EYE], "rotation": [1.0, 0.0, 0.0, 0.0]}  # half a turn about x: z points down
-HOME = {"translation": [0.0, -0.3, 1.1], "rotation": [1.0, 0.0, 0.0, 0.0]}
+VIEW, HOME = ({"translation": at, "rotation": [1.0, 0.0, 0.0, 0.0]} for at in ([0.0, 0.0, EYE], [0.0, -0.3, 1.1]))
 ROBOT = {"name": "hand", "hand": [], "finger": [], "max_opening_m": 0.08, "max_grip_force_n": 30.0, "home": HOME,
          "pad_half_length_m": 0.01, "workspace_min": [-0.6, -0.5, 0.74], "workspace_max": [0.6, 0.5, 1.3],
          "max_speed_m_s": 0.5, "max_turn_rad_s": 2.0, "tick_s": 0.02}
@@ -34,13 +34,9 @@ def picture():
 
 def tick(tcp, opening_m, grip_force_n):
     reached = max(abs(a - b) for a, b in zip(tcp["translation"], [*block[:2], block[2] + SIDE / 2])) < 0.03
-    if opening_m >= SIDE or not (world["held"] or reached):
-        world["held"] = None
-        block[2] = TABLE + 0.001 * on_mat()
-    else:
-        world["held"] = world["held"] or [b - a for a, b in zip(tcp["translation"], block)]
-        block[:] = [a + held for a, held in zip(tcp["translation"], world["held"])]
-    force, opening = (9.0, SIDE) if world["held"] else (0.0, opening_m)
+    held = opening_m < SIDE and (world["held"] or reached and [b - a for a, b in zip(tcp["translation"], block)])
+    world["held"], force, opening = held, 9.0 if held else 0.0, SIDE if held else opening_m
+    block[:] = [a + b for a, b in zip(tcp["translation"], held)] if held else [*block[:2], TABLE + 0.001 * on_mat()]
     arm.update(time=arm["time"] + 20_000_000, tcp=tcp, opening_m=opening, commanded_opening_m=opening_m,
                pad_force_n=[[0.0, force, 0.0], [0.0, -force, 0.0]])
 
@@ -58,8 +54,7 @@ def answer(ask):
             "capture": {"answer": "frame", "header": header | {"time": now}, "bytes": len(raw)},
             "command": {"answer": "feedback", "feedback": arm}, "feedback": {"answer": "feedback", "feedback": arm},
             "wait-until": {"answer": "time", "time": now}, "stop": {"answer": "stopped"},
-            "done": {"answer": "verdict", "verdict": {"strict": on_mat(), "explanation": f"the block is at {block}"}},
-            }[kind], raw
+            "done": {"answer": "verdict", "verdict": {"strict": on_mat(), "explanation": f"block: {block}"}}}[kind], raw
 
 server = socket.create_server(("127.0.0.1", int((sys.argv + ["7401"])[1])))
 print(f"listening on tcp://127.0.0.1:{server.getsockname()[1]}", flush=True)

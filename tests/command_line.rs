@@ -77,6 +77,19 @@ fn a_method_that_does_not_exist_is_named() {
 }
 
 #[test]
+fn a_robot_that_is_not_there_or_cannot_do_what_is_asked_is_named() {
+    let dir = tempfile::tempdir().unwrap();
+    let address = format!("unix://{}", dir.path().join("nobody.sock").display());
+    refuses(&["run", "--robot", &address], &["nobody.sock", "acm sim serve"]);
+    refuses(&["run", "--robot", &address, "--inject", "slip@1"], &["slip@N", "acm sim serve --inject"]);
+    refuses(&["run", "--robot", &address, "--seed", "1..2"], &["one seed"]);
+    refuses(&["sim", "serve", "put-back-block", "--inject", "black-frames"], &["slip@N", "acm run"]);
+    let taken = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = format!("tcp://{}", taken.local_addr().unwrap());
+    refuses(&["sim", "serve", "put-back-block", "--listen", &address], &[&address, "another host"]);
+}
+
+#[test]
 fn a_library_file_with_a_parameter_out_of_range_is_refused() {
     let dir = tempfile::tempdir().unwrap();
     let library = Path::new(env!("CARGO_MANIFEST_DIR")).join("memory/library");

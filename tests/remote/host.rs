@@ -8,7 +8,7 @@ use std::{
     process::{Child, Command, Stdio},
     sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError},
     thread::JoinHandle,
-    time::Duration,
+    time::{Duration, Instant},
 };
 
 /// Only against a test that hangs.
@@ -121,4 +121,10 @@ impl HostProcess {
         let (seed, listen) = (seed.to_string(), Address::Unix(socket.into()).to_string());
         HostProcess::start(&mut acm(&["sim", "serve", scenario, "--seed", &seed, "--listen", &listen]))
     }
+}
+
+/// Wall time of a test's own limit.
+#[allow(clippy::disallowed_methods)]
+pub fn now() -> Instant {
+    Instant::now()
 }

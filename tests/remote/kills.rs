@@ -1,16 +1,14 @@
 //! One of the two processes is killed, or an actor fails, at seeded random moments spread over a run. The other side
 //! ends soon and says why, nothing is left that stops the next run, and memory holds what was acknowledged.
 
-use crate::host::{HostProcess, Process, acm, config, runner, signal};
-use acm::serve;
+use crate::{
+    host::{HostProcess, Process, acm, config, now, runner, signal},
+    hunted::{Hunt, Hunted},
+};
 use acm_actors::{
     message::Message,
-    remote::{Address, FrameMode, Host, HostEvent, RemoteRobot, RobotServer},
+    remote::{Address, FrameMode, RemoteRobot},
     report::Ending,
-};
-use acm_concept::{
-    camera::{CameraError, CameraModel, CameraSource, RgbdFrame},
-    embodiment::{Command, Embodiment, EmbodimentError, Feedback, RobotDescription},
 };
 use acm_memory::{AcmMemory, Memory};
 use acm_runtime::{
@@ -18,13 +16,12 @@ use acm_runtime::{
     frame_bus::leftovers,
     journal::{Journal, JournalError, MemoryJournal},
 };
-use acm_sim::{Scenario, SimOptions, Simulation};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::{
-    path::{Path, PathBuf},
+    path::Path,
     sync::{
-        Arc, Mutex, PoisonError,
+        Arc, Mutex,
         atomic::{AtomicU64, Ordering},
     },
     time::{Duration, Instant},
@@ -70,12 +67,6 @@ fn a_simulator_that_hangs_is_not_waited_for() {
     let Ending::Broken { reason } = &result.report.ending else { panic!("{:?}", result.report.ending) };
     assert!(reason.contains("is lost: the other end did not answer within 4.0 s"), "{reason}");
     assert!(killer.since() < LIMIT, "{:?}", killer.since());
-}
-
-/// Wall time of a test's own limit.
-#[allow(clippy::disallowed_methods)]
-fn now() -> Instant {
-    Instant::now()
 }
 
 /// A journal that sends a signal to a process when the nth message is about to be handled.
@@ -165,119 +156,6 @@ fn probe(address: &Address, memory: &Path) {
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
 }
 
-/// A served simulation whose robot and camera count questions, and kill the agent at one of them.
-struct Hunted {
-    address: Address,
-    hunter: Hunter,
-    log: Arc<Mutex<Vec<(HostEvent, Instant)>>>,
-    stopper: acm_actors::remote::Stopper,
-    thread: Option<std::thread::JoinHandle<()>>,
-}
-
-#[derive(Clone, Default)]
-struct Hunter(Arc<Mutex<Hunt>>);
-
-#[derive(Default)]
-struct Hunt {
-    /// Questions until the kill.
-    left: u64,
-    /// How long the agent may still go on after the question.
-    grace: Duration,
-    victim: u32,
-    memory: PathBuf,
-    /// The log as it was at the question, when nothing was being written.
-    acknowledged: Option<Vec<u8>>,
-    killed: Option<Instant>,
-}
-
-impl Hunter {
-    #[allow(clippy::disallowed_methods)] // the kill comes from outside, while the agent goes on
-    fn question(&self) {
-        let mut hunt = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        hunt.left = hunt.left.wrapping_sub(1);
-        if hunt.left != 0 || hunt.victim == 0 {
-            return;
-        }
-        hunt.acknowledged = Some(std::fs::read(hunt.memory.join("events.log")).unwrap_or_default());
-        if hunt.grace.is_zero() {
-            signal(hunt.victim, "KILL");
-            hunt.killed = Some(now());
-            return;
-        }
-        let (own, victim, grace) = (self.clone(), hunt.victim, hunt.grace);
-        std::thread::spawn(move || {
-            std::thread::sleep(grace);
-            signal(victim, "KILL");
-            own.0.lock().unwrap_or_else(PoisonError::into_inner).killed = Some(now());
-        });
-    }
-}
-
-struct HuntedRobot(Box<dyn Embodiment>, Hunter);
-
-impl Embodiment for HuntedRobot {
-    fn description(&self) -> &RobotDescription {
-        self.0.description()
-    }
-    fn feedback(&self) -> Feedback {
-        self.0.feedback()
-    }
-    fn command(&mut self, command: &Command) -> Result<Feedback, EmbodimentError> {
-        self.1.question();
-        self.0.command(command)
-    }
-    fn stop(&mut self) {
-        self.0.stop();
-    }
-}
-
-struct HuntedCameras(Box<dyn CameraSource>, Hunter);
-
-impl CameraSource for HuntedCameras {
-    fn cameras(&self) -> &[CameraModel] {
-        self.0.cameras()
-    }
-    fn capture(&mut self, camera: &str) -> Result<RgbdFrame, CameraError> {
-        self.1.question();
-        self.0.capture(camera)
-    }
-}
-
-impl Hunted {
-    #[allow(clippy::disallowed_methods)] // the host's own process, were this not a test
-    fn serve(seed: u64, socket: &Path) -> Hunted {
-        let options = SimOptions { seed, motion: true, ..SimOptions::default() };
-        let simulation =
-            Simulation::new(&Scenario::open(SCENARIO).unwrap(), &options, runner().renderer().unwrap()).unwrap();
-        let (hunter, host) = (Hunter::default(), serve::host(&Arc::new(simulation)));
-        let host = Host {
-            embodiment: Box::new(HuntedRobot(host.embodiment, hunter.clone())),
-            cameras: Box::new(HuntedCameras(host.cameras, hunter.clone())),
-            ..host
-        };
-        let server = RobotServer::bind(&Address::Unix(socket.into()), FrameMode::Auto).unwrap();
-        let log: Arc<Mutex<Vec<(HostEvent, Instant)>>> = Arc::default();
-        let (address, stopper, told) = (server.address().clone(), server.stopper(), Arc::clone(&log));
-        let thread = std::thread::spawn(move || {
-            server.serve(host, |event| told.lock().unwrap().push((event, now())));
-        });
-        Hunted { address, hunter, log, stopper, thread: Some(thread) }
-    }
-
-    /// When the last agent was found to be gone.
-    fn left(&self) -> Option<Instant> {
-        let log = self.log.lock().unwrap();
-        log.iter().rev().find(|(event, _)| matches!(event, HostEvent::Left { .. })).map(|(_, at)| *at)
-    }
-}
-
-impl Drop for Hunted {
-    fn drop(&mut self) {
-        self.stopper.stop();
-        self.thread.take().unwrap().join().unwrap();
-    }
-}
-
 fn kill_agents(seed: u64, rounds: u32) {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let dir = tempfile::tempdir().unwrap();
@@ -285,7 +163,7 @@ fn kill_agents(seed: u64, rounds: u32) {
     let mut hit = 0;
     for round in 0..rounds {
         let memory = dir.path().join(format!("memory{}", round / 4));
-        let host = Hunted::serve(u64::from(round), &socket);
+        let host = Hunted::serve(SCENARIO, u64::from(round), &socket);
         let question = random.random_range(1..QUESTIONS);
         let grace = Duration::from_micros(if round % 3 == 0 { 0 } else { random.random_range(1..30_000) });
         let pid = {
@@ -331,7 +209,7 @@ fn fail_actors(seed: u64, rounds: u32) {
     let mut failed = 0;
     for (round, (role, messages)) in (0..rounds).zip(roles.into_iter().cycle()) {
         let memory = dir.path().join(format!("memory{}", round / 4));
-        let host = Hunted::serve(u64::from(round), &socket);
+        let host = Hunted::serve(SCENARIO, u64::from(round), &socket);
         let fault = format!("panic@{role}:{}", random.random_range(1..=messages));
         let address = host.address.to_string();
         let run = ["run", "--robot", &address, "--memory", memory.to_str().unwrap(), "--inject", &fault];

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used)] // a failed unwrap is the test's verdict
 
 mod host;
+mod hunted;
 mod journal;
 mod kills;
 mod python;

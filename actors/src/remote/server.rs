@@ -2,20 +2,21 @@
 //!
 //! Blocking threads and plain sockets: a host answers one question at a time and has nothing to do in between.
 
+mod session;
+
 use super::{
     FrameMode,
     address::{Address, Listener, Stream},
-    picture,
-    protocol::{Answer, Ask, Carrier, HostVerdict, Refusal, VERSION, Welcome},
+    protocol::{Answer, Ask, Carrier, HostVerdict, VERSION},
     wire::{Wire, WireError},
 };
 use acm_concept::{
-    camera::{CameraError, CameraSource, RgbdFrame},
-    embodiment::{Clock, Embodiment, EmbodimentError},
+    camera::CameraSource,
+    embodiment::{Clock, Embodiment},
     task::TaskSpec,
 };
-use acm_runtime::frame_bus::{BusError, BusLimits, Bytes, SharedMemoryWriter, run_id};
 use serde_json::Value;
+use session::{Session, carrier};
 use std::{
     collections::BTreeMap,
     io,
@@ -59,10 +60,10 @@ pub struct Host {
 
 /// Why a host cannot listen.
 #[derive(Debug, Error)]
-#[error("{address} cannot be listened on: {source}; another host may run there: choose another address")]
+#[error("{address} cannot be listened on ({cause}): another host may run there: choose another address")]
 pub struct ServeError {
     address: Address,
-    source: io::Error,
+    cause: io::Error,
 }
 
 /// What happens at a host, for its log.
@@ -138,7 +139,7 @@ impl RobotServer {
     /// # Errors
     /// The address is in use or is none of this machine's.
     pub fn bind(address: &Address, frames: FrameMode) -> Result<RobotServer, ServeError> {
-        let listener = address.listen().map_err(|source| ServeError { address: address.clone(), source })?;
+        let listener = address.listen().map_err(|cause| ServeError { address: address.clone(), cause })?;
         Ok(RobotServer { listener, frames, shared: Arc::default() })
     }
 
@@ -281,108 +282,5 @@ impl Drop for Turn {
     fn drop(&mut self) {
         *self.0.taken.lock().unwrap_or_else(PoisonError::into_inner) = false;
         self.0.freed.notify_one();
-    }
-}
-
-/// What is agreed on: the carrier, its bus, and why it is not the agent's first choice.
-type Agreed = (Carrier, Option<SharedMemoryWriter>, Option<String>);
-
-/// Agrees on how frames travel. Each agent gets a bus of its own, so that what a killed one held is gone with it.
-fn carrier(task: &TaskSpec, mode: FrameMode, agent: &[Carrier]) -> Result<Agreed, String> {
-    let both = |carrier: Carrier| mode.carriers().contains(&carrier) && agent.contains(&carrier);
-    let mut fallback = None;
-    if both(Carrier::SharedMemory) {
-        match open_bus(task) {
-            Ok(bus) => return Ok((Carrier::SharedMemory, Some(bus), None)),
-            Err(error) => fallback = Some(error.to_string()),
-        }
-    }
-    match (both(Carrier::Inline), fallback) {
-        (true, fallback) => Ok((Carrier::Inline, None, fallback)),
-        (false, Some(reason)) => Err(reason),
-        (false, None) => Err(format!("frames travel by {:?} here, the agent takes {agent:?}", mode.carriers())),
-    }
-}
-
-fn open_bus(task: &TaskSpec) -> Result<SharedMemoryWriter, BusError> {
-    let pixels = task.cameras.iter().map(|camera| camera.intrinsics.pixels()).max().unwrap_or(0);
-    SharedMemoryWriter::create(&format!("acm/frames/{}", run_id()), BusLimits::default(), picture::raw_bytes(pixels))
-}
-
-/// One agent's time with the world.
-struct Session<'a> {
-    host: &'a mut Host,
-    bus: Option<SharedMemoryWriter>,
-}
-
-impl Session<'_> {
-    fn welcome(&self, frames: Carrier) -> Answer {
-        Answer::Hello(Box::new(Welcome {
-            protocol: VERSION,
-            host: self.host.name.clone(),
-            robot: self.host.embodiment.description().clone(),
-            task: self.host.task.clone(),
-            time: self.host.clock.now(),
-            feedback: self.host.embodiment.feedback(),
-            frames,
-            bus: self.bus.as_ref().map(|bus| bus.name().to_string()),
-        }))
-    }
-
-    /// The answer and the pixels that follow it.
-    fn answer(&mut self, ask: Ask, tell: &impl Fn(HostEvent)) -> (Answer, Option<[Bytes; 2]>) {
-        let refused = |error: &EmbodimentError| {
-            let (why, reason) = Refusal::of(error);
-            Answer::Refused { why, reason }
-        };
-        let answer = match ask {
-            Ask::Hello { .. } => Answer::Error { reason: "a second hello".into() },
-            Ask::Capture { camera, by } => return self.capture(&camera, by, tell),
-            Ask::Feedback => Answer::Feedback { feedback: self.host.embodiment.feedback() },
-            Ask::Command { command } => match self.host.embodiment.command(&command) {
-                Ok(feedback) => Answer::Feedback { feedback },
-                Err(error) => refused(&error),
-            },
-            Ask::WaitUntil { time } => match self.host.clock.wait_until(time) {
-                Ok(time) => Answer::Time { time },
-                Err(error) => refused(&error),
-            },
-            Ask::Stop => {
-                self.host.embodiment.stop();
-                Answer::Stopped
-            }
-            Ask::Done { report } => Answer::Verdict { verdict: (self.host.judge)(&report) },
-        };
-        (answer, None)
-    }
-
-    fn capture(&mut self, camera: &str, by: Carrier, tell: &impl Fn(HostEvent)) -> (Answer, Option<[Bytes; 2]>) {
-        let frame = match self.host.cameras.capture(camera) {
-            Ok(frame) => frame,
-            Err(error) => {
-                let reason = match error {
-                    CameraError::Failed { reason, .. } => reason,
-                    other => other.to_string(),
-                };
-                return (Answer::Refused { why: Refusal::Failed, reason }, None);
-            }
-        };
-        if by == Carrier::SharedMemory && self.publish(&frame, tell) {
-            return (Answer::Frame { header: frame.header, bytes: None }, None);
-        }
-        let planes = picture::planes(&frame);
-        let bytes = Some(planes.iter().map(|plane| plane.len() as u64).sum());
-        (Answer::Frame { header: frame.header, bytes }, Some(planes))
-    }
-
-    /// Puts a frame on the bus. Where that fails this and all later frames go inline: an agent takes them as they come.
-    fn publish(&mut self, frame: &RgbdFrame, tell: &impl Fn(HostEvent)) -> bool {
-        let Some(bus) = &self.bus else { return false };
-        let published = bus.publish(frame.header.id.0, &picture::byte_frame(frame));
-        if let Err(error) = &published {
-            tell(HostEvent::Inline { reason: error.to_string() });
-            self.bus = None;
-        }
-        published.is_ok()
     }
 }

@@ -25,7 +25,7 @@ pub enum WireError {
     Late(Duration),
     /// The socket failed.
     #[error("the connection failed: {0}")]
-    Io(#[source] io::Error),
+    Io(io::Error),
     /// The other end does not speak the protocol.
     #[error("what came is no message of the robot protocol: {0}")]
     Message(String),
