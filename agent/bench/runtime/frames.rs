@@ -67,6 +67,7 @@ fn figures(medians: &BTreeMap<(&str, u32), (f64, f64)>, result: &mut BenchResult
         "What it does not buy: speed within one process. There an Arc over a queue hands over the same pixels, by no more",
         "than a pointer. The writer still copies a frame once into shared memory, unless the camera writes there itself:",
         "that row grows with the frame, and the hand-over figures do not hold it; those named `copied in` do.",
+        "All these times hold the waking of a thread that sleeps; the Arc rows say about how long that takes here and now.",
     ];
     result.notes.extend(notes.map(str::to_owned));
 }

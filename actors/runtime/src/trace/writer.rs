@@ -152,6 +152,8 @@ impl TraceWriter {
             .library(concat!("acm-runtime ", env!("CARGO_PKG_VERSION")))
             .compression(Some(Compression::Zstd))
             .compression_threads(0)
+            // The fastest: what it leaves larger costs less than the time that the run would lose.
+            .compression_level(1)
             .chunk_size(Some(CHUNK_BYTES))
             .disable_seeking(true)
             .create(sink)
