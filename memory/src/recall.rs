@@ -1,7 +1,7 @@
 //! Recalls places: now, before a move, at the start. What was neither seen nor done is unknown, and said so.
 
 use crate::{
-    entry::{Moment, ObjectEntry, Presence, Transition},
+    entry::{Moment, ObjectEntry, PlaceCause, Presence, Transition},
     geometry::{Body, symmetry, upright_motion},
     moves::{Departure, departures, evidence, first_departure},
     query::{PlaceReference, Recall},
@@ -98,10 +98,12 @@ fn now(entry: &ObjectEntry) -> Recall<Place> {
 }
 
 fn before_moved(state: &State, library: &TemplateLibrary, entry: &ObjectEntry) -> Recall<Place> {
-    let earlier = || departures(entry).last().map(|last| last.by.moment.episode);
+    let departures: Vec<_> = departures(entry).into_iter().filter(|d| !is_made_now(state, entry, d)).collect();
+    let first_in = |episode: u32| departures.iter().copied().find(|d| d.by.moment.episode == episode);
+    let earlier = || departures.last().map(|last| last.by.moment.episode);
     let departure = moved_for_earlier_subtask(state, entry)
-        .or_else(|| first_departure(entry, state.next.episode))
-        .or_else(|| earlier().and_then(|episode| first_departure(entry, episode)));
+        .or_else(|| first_in(state.next.episode))
+        .or_else(|| earlier().and_then(first_in));
     match departure {
         Some(departure) => known(state, library, entry, &departure),
         None => Recall::Unknown {
@@ -112,6 +114,15 @@ fn before_moved(state: &State, library: &TemplateLibrary, entry: &ObjectEntry) -
             candidates: free_places(state, library, entry),
         },
     }
+}
+
+/// Whether a departure is the robot's own deed for the subtask that is under way: "where it came from" means a move
+/// before that.
+fn is_made_now(state: &State, entry: &ObjectEntry, departure: &Departure<'_>) -> bool {
+    let (PlaceCause::Own(id) | PlaceCause::Grasped(id)) = departure.by.cause else { return false };
+    let (instructed, current) = (state.progress.instructed, state.progress.current());
+    let is_current = |t: &Transition| t.moment >= instructed && t.subtask == Some(current) && t.object() == entry.id;
+    state.transitions.iter().any(|t| t.id == id && is_current(t))
 }
 
 /// The first departure since an earlier subtask of the running instruction began to act on the object: "bring it

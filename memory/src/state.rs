@@ -107,7 +107,11 @@ impl State {
                 entry.presence = Presence::Missing;
             }
         }
-        Arc::make_mut(&mut self.tracks).clear();
+        // Which of several alike a thing is stays as doubtful as it was.
+        let tracks = std::mem::take(Arc::make_mut(&mut self.tracks));
+        let doubtful = tracks.into_iter().filter(|(_, track)| track.doubt.is_some());
+        let kept = doubtful.map(|(id, track)| (id, Track { doubt: track.doubt, ..Track::default() }));
+        self.tracks = Arc::new(kept.collect());
     }
 
     fn put_object(&mut self, believed: &Believed) {
