@@ -98,12 +98,14 @@ fn now(entry: &ObjectEntry) -> Recall<Place> {
 }
 
 fn before_moved(state: &State, library: &TemplateLibrary, entry: &ObjectEntry) -> Recall<Place> {
-    let departures: Vec<_> = departures(entry).into_iter().filter(|d| !is_made_now(state, entry, d)).collect();
-    let first_in = |episode: u32| departures.iter().copied().find(|d| d.by.moment.episode == episode);
-    let earlier = || departures.last().map(|last| last.by.moment.episode);
+    let (made_now, before): (Vec<_>, Vec<_>) =
+        departures(entry).into_iter().partition(|d| is_made_now(state, entry, d));
+    let first_in = |episode: u32| before.iter().copied().find(|d| d.by.moment.episode == episode);
+    let earlier = || before.last().map(|last| last.by.moment.episode);
     let departure = moved_for_earlier_subtask(state, entry)
         .or_else(|| first_in(state.next.episode))
-        .or_else(|| earlier().and_then(first_in));
+        .or_else(|| earlier().and_then(first_in))
+        .or_else(|| made_now.first().copied());
     match departure {
         Some(departure) => known(state, library, entry, &departure),
         None => Recall::Unknown {
@@ -117,7 +119,7 @@ fn before_moved(state: &State, library: &TemplateLibrary, entry: &ObjectEntry) -
 }
 
 /// Whether a departure is the robot's own deed for the subtask that is under way: "where it came from" means a move
-/// before that.
+/// before that, if there was one.
 fn is_made_now(state: &State, entry: &ObjectEntry, departure: &Departure<'_>) -> bool {
     let (PlaceCause::Own(id) | PlaceCause::Grasped(id)) = departure.by.cause else { return false };
     let (instructed, current) = (state.progress.instructed, state.progress.current());

@@ -139,7 +139,7 @@ fn holds_what_was_told(memory: &Path, journal: &MemoryJournal, case: &str) {
     let opened = AcmMemory::open(memory, acm_memory::default_library().unwrap().into()).unwrap();
     let Some(told) = told else { return };
     let body: serde_json::Value = serde_json::from_slice(&told.body).unwrap();
-    let view = &body["body"]["view"];
+    let view = &body["view"];
     let kept: Vec<String> = opened.view().objects().iter().map(|object| object.id.to_string()).collect();
     let objects = view["objects"].as_array().unwrap();
     for object in objects {

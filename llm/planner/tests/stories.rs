@@ -460,3 +460,23 @@ fn the_own_grasp_for_a_guess_does_not_become_the_answer() {
     assert_eq!(world.done_skills.len(), 2);
     assert!(world.spot(cube).distance(home) > 0.05, "it did not come from where it stood");
 }
+
+#[test]
+fn of_two_alike_the_one_that_was_moved_is_put_back() {
+    for moved in [0, 1] {
+        let mut world = World::new();
+        let cubes = [world.cube(DVec2::new(-0.2, 0.0), RED, None), world.cube(DVec2::new(0.2, 0.0), RED, None)];
+        let home = world.spot(cubes[moved]);
+        let elsewhere = Pose::from_translation(DVec2::new(0.0, -0.15).extend(world::TABLE_Z));
+        world.seen_moving(cubes[moved], Place { support: None, pose: elsewhere, tolerance_m: 0.03 });
+        let end = run(&mut world, &task("Put the cube back where it was."), &abstain(), |_, _| {});
+        assert!(matches!(end, Decision::Done { .. }), "{end:?}");
+        assert!(world.spot(cubes[moved]).distance(home) < 1e-9, "{:?}", world.done_skills);
+    }
+    // Nothing was moved: then nothing tells which of the two is meant.
+    let mut world = World::new();
+    world.cube(DVec2::new(-0.2, 0.0), RED, None);
+    world.cube(DVec2::new(0.2, 0.0), RED, None);
+    let end = run(&mut world, &task("Put the cube back where it was."), &abstain(), |_, _| {});
+    assert_eq!(given_up(&end).0, GiveUpCause::Identity);
+}

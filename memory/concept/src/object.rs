@@ -52,6 +52,7 @@ pub struct GroundedPart {
     /// Template type tau.
     pub template: String,
     /// Which of the template's parts it is ([`WHOLE`](crate::template::WHOLE) where the template has but one).
+    #[serde(default = "whole")]
     pub name: String,
     /// Parameters Theta, in the template's order. The parts of one template share them.
     pub parameters: Vec<ParameterEstimate>,
@@ -63,6 +64,10 @@ pub struct GroundedPart {
     pub functions: Vec<String>,
     /// Colour of the part's visible surface.
     pub appearance: Appearance,
+}
+
+fn whole() -> String {
+    crate::template::WHOLE.into()
 }
 
 impl GroundedPart {

@@ -6,6 +6,7 @@ mod episodes;
 mod identity;
 mod places;
 mod retrieval;
+mod staplers;
 mod story;
 mod updates;
 

@@ -77,3 +77,46 @@ fn impossible_rules_end_after_the_attempts() {
     world.attempts = 10;
     assert_eq!(Layout::draw(&world, 0).unwrap_err(), LayoutError::Rejected { attempts: 10 });
 }
+
+/// One stapler of its model and one that is made differently.
+const MADE: &str = r##"
+[[object]]
+name = "made"
+model = "stapler"
+position = [-0.1, 0.1, 0.74]
+scale = [1.5, 1.0, 1.0]
+hue_deg = 240.0
+
+[judge]
+"##;
+
+#[test]
+fn copies_can_be_made_larger_and_of_another_hue() {
+    let original = concat!(env!("CARGO_MANIFEST_DIR"), "/scenarios/put-back-block.toml");
+    let text = std::fs::read_to_string(original).unwrap().replacen("[judge]\n", MADE, 1);
+    let scenario = Scenario::parse("s.toml", &text).unwrap();
+    let layout = Layout::draw(&scenario.world, 0).unwrap();
+    let made = layout.objects.iter().find(|object| object.name == "made").unwrap();
+    let plain = layout.objects.iter().find(|object| object.name == "cube").unwrap();
+    assert!((made.size().x - 0.195).abs() < 0.002 && (made.size().y - 0.036).abs() < 1e-9, "{}", made.size());
+    let [r, g, b] = made.solids[0].color;
+    assert!(b > r && r == g, "red became blue: {r} {g} {b}");
+    assert!(plain.solids[0].color[0] > plain.solids[0].color[2]);
+    let wrong = text.replace("scale = [1.5,", "scale = [50.0,");
+    let error = Layout::draw(&Scenario::parse("s.toml", &wrong).unwrap().world, 0).unwrap_err();
+    assert!(error.to_string().contains("made") && error.to_string().contains("0.1 to 10"), "{error}");
+}
+
+#[test]
+fn a_condition_can_reject_a_layout() {
+    for seed in 0..20 {
+        let (scenario, layout) = layout("return-stapler-unseen", seed);
+        let at = |name: &str| layout.places.iter().find(|(place, _)| place == name).unwrap().1;
+        let target = at("target");
+        assert!(target.x.abs() <= 0.32 && (-0.18..=0.16).contains(&target.y), "seed {seed}: {target}");
+        let stapler = layout.objects.iter().find(|object| object.name == "stapler").unwrap();
+        let distance = stapler.pose.translation.distance(target);
+        assert!((0.2..=0.6).contains(&distance), "seed {seed}: {distance}");
+        drop(scenario);
+    }
+}

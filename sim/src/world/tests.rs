@@ -47,6 +47,33 @@ fn third_parties_carry_things_on_time() {
     assert!(cube(&world).pose.translation.distance(start.translation) < 1e-3, "{}", cube(&world).pose.translation);
 }
 
+const COVER: &str = r#"
+[[event]]
+name = "somebody stands before the camera"
+after_s = 0.5
+cover = ["head"]
+over_s = 1.0
+
+[judge]
+"#;
+
+#[test]
+fn a_camera_is_covered_for_as_long_as_the_event_lasts() {
+    let mut world = World::new(&scenario_with(COVER), &SimOptions::default()).unwrap();
+    let mut covered_at = |seconds: f64| {
+        world.wait_until(Time::from_seconds(seconds)).unwrap();
+        (world.is_covered(0), world.is_covered(1))
+    };
+    assert_eq!(
+        [0.4, 0.6, 1.4, 1.6].map(&mut covered_at),
+        [(false, false), (true, false), (true, false), (false, false)]
+    );
+    let original = concat!(env!("CARGO_MANIFEST_DIR"), "/scenarios/put-back-block.toml");
+    let wrong = std::fs::read_to_string(original).unwrap().replacen("[judge]\n", &COVER.replace("head", "heat"), 1);
+    let error = Scenario::parse("s.toml", &wrong).unwrap_err().to_string();
+    assert!(error.contains("no camera `heat`") && error.contains("head"), "{error}");
+}
+
 #[test]
 fn commands_beyond_the_limits_are_refused_and_move_nothing() {
     let mut world = World::new(&Scenario::open("put-back-block").unwrap(), &SimOptions::default()).unwrap();

@@ -96,3 +96,63 @@ fn a_rest_turns_the_part_and_has_its_own_symmetry() {
     assert!(refused("up = \"z\"").contains("`z`"));
     assert!(refused("up = \"x\"\nprior = 0.0").contains("prior 0"));
 }
+
+/// A box with a flap that opens about its -x edge.
+const CASE: &str = r#"
+template = "case"
+seen_by = "depth"
+affordances = ["supportive"]
+[synopsis]
+description = "a box with a flap"
+affordance = "the flap opens"
+intended_use = "to keep things"
+nouns = [{ noun = "case" }]
+[[parameter]]
+name = "length"
+unit = "m"
+min = 0.05
+max = 0.3
+initial = "extent_x"
+[[parameter]]
+name = "opening"
+unit = "rad"
+min = 0.0
+max = 1.6
+initial = "0.5"
+[[part]]
+name = "body"
+[[part]]
+name = "flap"
+affordances = ["openable"]
+position = ["-length / 2", "0", "0.04"]
+tilt = "-opening"
+[[solid]]
+part = "body"
+shape = "box"
+size = ["length", "0.1", "0.04"]
+position = ["0", "0", "0.02"]
+[[solid]]
+part = "flap"
+shape = "box"
+size = ["length", "0.1", "0.01"]
+position = ["length / 2", "0", "0.005"]
+"#;
+
+#[test]
+fn parts_move_with_the_parameters() {
+    let case = Template::parse("case.toml", CASE).unwrap();
+    let values = [("length", 0.2), ("opening", std::f64::consts::FRAC_PI_2)];
+    let frames = case.part_frames(&values).unwrap();
+    // Opened by a right angle the flap points straight up from the hinge.
+    let tip = frames[1].transform_point(DVec3::new(0.2, 0.0, 0.0));
+    assert!(tip.distance(DVec3::new(-0.1, 0.0, 0.24)) < 1e-12, "{tip}");
+    let solids = case.solids(&values).unwrap();
+    assert!((solids[1].half_extents() - DVec3::new(0.005, 0.05, 0.1)).length() < 1e-12);
+    assert_eq!(case.part_solids("flap", &values).unwrap().len(), 1);
+    assert!(case.part_solids("lid", &values).unwrap().is_empty());
+    assert_eq!(case.parts[0].affordances, ["supportive"], "the template's own affordances are the main part's");
+    assert_eq!(case.affordances().collect::<Vec<_>>(), ["supportive", "openable"]);
+    let error = |from: &str, to: &str| Template::parse("case.toml", &CASE.replace(from, to)).unwrap_err().to_string();
+    assert!(error("part = \"flap\"", "part = \"flip\"").contains("`flip`, which is not among: body, flap"));
+    assert!(error("name = \"flap\"", "name = \"body\"").contains("`body` is declared twice"));
+}
