@@ -40,6 +40,9 @@ const FLAT_M: f64 = 0.005;
 const SAME_COLOR: f64 = 15.0;
 /// A newcomer that lies inside something is a piece of it unless it is larger by more than this factor says.
 const FRAGMENT_AREA: f64 = 0.7;
+/// A scrap has less than this share of the area of what it belongs to, and touches it within so much, metres.
+const SCRAP_AREA: f64 = 0.5;
+const SCRAP_GAP_M: f64 = 0.01;
 /// Matches above this probability may verify an object.
 const SURE_MATCH: f64 = 0.6;
 
@@ -126,7 +129,7 @@ impl Frame<'_, '_, '_> {
         for found in matches {
             let Some(percept) = percepts.get(found.percept) else { continue };
             let resolved = match found.object {
-                Some(id) => self.take_known(id, percept, found, cause),
+                Some(id) => self.take_known(id, percept, (found, matches), cause),
                 None => self.take_new(percept, found, matches, cause),
             };
             self.grounding.resolved.extend(resolved);
@@ -137,10 +140,11 @@ impl Frame<'_, '_, '_> {
         &mut self,
         id: ObjectId,
         percept: &Percept<'_>,
-        found: &Match,
+        (found, matches): (&Match, &[Match]),
         cause: PlaceCause,
     ) -> Option<Resolved> {
         let moment = self.draft.moment();
+        let inside_another = self.is_fragment(percept, matches);
         let seen_through = self.views.iter().any(|v| v.object == id && v.visibility == Visibility::SeenThrough);
         let confused = self.confused_with(id);
         let library = self.draft.library;
@@ -149,6 +153,8 @@ impl Frame<'_, '_, '_> {
         let earlier_run = staged.entry.last_seen.episode < moment.episode;
         let low = percept.object.confidence < LOW_CONFIDENCE;
         let verdict = if low { View::Rejected } else { judge(staged, percept, seen_through || earlier_run, library) };
+        // A known thing does not come to stand inside another one: that is a piece of the other.
+        let verdict = if inside_another && matches!(verdict, View::Moved(_)) { View::Rejected } else { verdict };
         let accepted = !matches!(verdict, View::Rejected | View::Pending(_));
         let own = staged.track.unconfirmed.is_some() || staged.track.disturbed;
         match verdict {
@@ -217,7 +223,9 @@ impl Frame<'_, '_, '_> {
     ) -> Option<Resolved> {
         let object = percept.object;
         let full = self.draft.state.objects.len() + self.stage.added() >= MAX_OBJECTS;
-        let piece = self.is_piece_of_known(percept, found, matches) || self.is_fragment(percept, matches);
+        let piece = self.is_piece_of_known(percept, found, matches)
+            || self.is_fragment(percept, matches)
+            || self.is_scrap(percept);
         if object.confidence < FALSE_ALARM || full || piece {
             return None;
         }
@@ -258,6 +266,19 @@ impl Frame<'_, '_, '_> {
         };
         let may_be = |other: &&Match| other.object.is_some_and(|id| found.possible.contains(&id));
         percept.object.truncated && matches.iter().filter(may_be).any(|other| beside(&other))
+    }
+
+    /// Whether a newcomer that something cuts off is a small piece of the same colour at the side of something larger
+    /// that this frame shows.
+    fn is_scrap(&self, percept: &Percept<'_>) -> bool {
+        let beside = |other: &Percept<'_>| {
+            let color = other.object.appearance.mean.chroma_distance(&percept.object.appearance.mean);
+            other.index != percept.index
+                && percept.body.area() < SCRAP_AREA * other.body.area()
+                && percept.body.gap(&other.body) < SCRAP_GAP_M
+                && color < SAME_COLOR
+        };
+        percept.object.truncated && percept.body.height() > FLAT_M && self.percepts.iter().any(beside)
     }
 
     /// Whether a newcomer lies inside something that this frame shows as well: two solids cannot share a place, so
