@@ -19,7 +19,7 @@ use acm_concept::{
     task::{OnUnknown, TaskSpec},
     template::TemplateLibrary,
 };
-use acm_planner::GiveUpCause;
+use acm_planner::{GiveUpCause, Lexicon};
 use acm_runtime::{envelope::Role, journal::Journal, system::PanicAt};
 use acm_sim::{OracleVerdict, Scenario, SharedRenderer, SimOptions, SimTimings, Simulation};
 use anyhow::Context;
@@ -93,6 +93,7 @@ pub struct Runner {
     runtime: tokio::runtime::Runtime,
     renderer: Option<SharedRenderer>,
     library: Arc<TemplateLibrary>,
+    lexicon: Option<Lexicon>,
     interrupt: Interrupt,
 }
 
@@ -112,7 +113,19 @@ impl Runner {
     pub fn without_renderer(library: TemplateLibrary) -> anyhow::Result<Runner> {
         // Ports block while they render or step the world, so one worker more than one.
         let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?;
-        Ok(Runner { runtime, renderer: None, library: Arc::new(library), interrupt: Interrupt::default() })
+        Ok(Runner {
+            runtime,
+            renderer: None,
+            library: Arc::new(library),
+            lexicon: None,
+            interrupt: Interrupt::default(),
+        })
+    }
+
+    /// The same renderer and runtime settings for agents with other words: another library and another lexicon.
+    pub fn with_words(&self, library: TemplateLibrary, lexicon: Lexicon) -> anyhow::Result<Runner> {
+        let other = Runner::without_renderer(library)?;
+        Ok(Runner { renderer: self.renderer.clone(), lexicon: Some(lexicon), ..other })
     }
 
     /// Ends the running episode when the process is interrupted from the keyboard.
@@ -228,6 +241,7 @@ impl Runner {
         let agent = Agent::builder(Arc::clone(&self.library), memory)
             .on_unknown(config.on_unknown)
             .seed(seed)
+            .lexicon(self.lexicon.clone())
             .wipe_at(config.faults.wipe_at.clone())
             .until(config.until)
             .journal(journal)
