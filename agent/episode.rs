@@ -2,7 +2,7 @@
 
 use crate::{
     inject::{Faults, FrameTap},
-    trace::recording::{Recording, TraceRequest},
+    trace::recording::{Recording, Stage, TraceRequest},
 };
 use acm_actors::{
     Agent,
@@ -166,12 +166,9 @@ impl Runner {
         config: &EpisodeConfig,
         journal: Arc<dyn Journal<Message>>,
     ) -> anyhow::Result<EpisodeResult> {
-        let Some(request) = &config.trace else { return self.episode(scenario, seed, config, journal, None) };
-        let recording = Recording::begin(request, scenario, seed, config, &self.adapter())?;
-        let result = self.episode(scenario, seed, config, journal, Some(recording.trace()));
-        let finished = recording.end(&result);
-        // What went wrong first is what is told.
-        result.and_then(|result| finished.map(|()| result))
+        let sensor = config.sensor.as_deref().unwrap_or_else(|| scenario.sensor());
+        let stage = Stage { world: scenario.name(), sensor, renderer: &self.adapter() };
+        recorded(&stage, seed, config, |trace| self.episode(scenario, seed, config, journal, trace))
     }
 
     fn episode(
@@ -211,9 +208,22 @@ impl Runner {
         config: &EpisodeConfig,
         journal: Arc<dyn Journal<Message>>,
     ) -> anyhow::Result<EpisodeResult> {
+        let world = robot.address().to_string();
+        let stage = Stage { world: &world, sensor: "the host's", renderer: "the host's" };
+        recorded(&stage, seed, config, |trace| self.episode_remote(robot, seed, config, journal, trace))
+    }
+
+    fn episode_remote(
+        &self,
+        robot: &RemoteRobot,
+        seed: u64,
+        config: &EpisodeConfig,
+        journal: Arc<dyn Journal<Message>>,
+        trace: Option<Arc<Trace>>,
+    ) -> anyhow::Result<EpisodeResult> {
         let started = now();
         let outside = Outside { embodiment: robot.embodiment(), cameras: robot.camera(), clock: robot.clock() };
-        let mut lived = self.live(robot.task().clone(), outside, seed, config, journal, None)?;
+        let mut lived = self.live(robot.task().clone(), outside, seed, config, journal, trace)?;
         let verdict = match &lived.report.ending {
             // Nobody has done anything yet that could be judged, and a lost host judges nothing.
             Ending::Until { .. } | Ending::Broken { .. } => Ok(None),
@@ -266,6 +276,21 @@ impl Runner {
         }
         Ok(Lived { report: run.report, spent_s, commands: commands.load(Ordering::Relaxed) })
     }
+}
+
+/// Runs an episode into a trace, where one is wanted.
+fn recorded(
+    stage: &Stage<'_>,
+    seed: u64,
+    config: &EpisodeConfig,
+    run: impl FnOnce(Option<Arc<Trace>>) -> anyhow::Result<EpisodeResult>,
+) -> anyhow::Result<EpisodeResult> {
+    let Some(request) = &config.trace else { return run(None) };
+    let recording = Recording::begin(request, stage, seed, config)?;
+    let result = run(Some(recording.trace()));
+    let finished = recording.end(&result);
+    // What went wrong first is what is told.
+    result.and_then(|result| finished.map(|()| result))
 }
 
 /// An episode before it is judged.
