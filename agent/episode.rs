@@ -2,7 +2,7 @@
 
 use crate::{
     inject::{Faults, FrameTap},
-    trace::recording::{Recording, TraceRequest},
+    trace::recording::{Recording, Stage, TraceRequest},
 };
 use acm_actors::{
     Agent,
@@ -19,7 +19,7 @@ use acm_concept::{
     task::{OnUnknown, TaskSpec},
     template::TemplateLibrary,
 };
-use acm_planner::GiveUpCause;
+use acm_planner::{GiveUpCause, Lexicon};
 use acm_runtime::{envelope::Role, journal::Journal, system::PanicAt};
 use acm_sim::{OracleVerdict, Scenario, SharedRenderer, SimOptions, SimTimings, Simulation};
 use anyhow::Context;
@@ -93,6 +93,7 @@ pub struct Runner {
     runtime: tokio::runtime::Runtime,
     renderer: Option<SharedRenderer>,
     library: Arc<TemplateLibrary>,
+    lexicon: Option<Lexicon>,
     interrupt: Interrupt,
 }
 
@@ -112,7 +113,19 @@ impl Runner {
     pub fn without_renderer(library: TemplateLibrary) -> anyhow::Result<Runner> {
         // Ports block while they render or step the world, so one worker more than one.
         let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?;
-        Ok(Runner { runtime, renderer: None, library: Arc::new(library), interrupt: Interrupt::default() })
+        Ok(Runner {
+            runtime,
+            renderer: None,
+            library: Arc::new(library),
+            lexicon: None,
+            interrupt: Interrupt::default(),
+        })
+    }
+
+    /// The same renderer and runtime settings for agents with other words: another library and another lexicon.
+    pub fn with_words(&self, library: TemplateLibrary, lexicon: Lexicon) -> anyhow::Result<Runner> {
+        let other = Runner::without_renderer(library)?;
+        Ok(Runner { renderer: self.renderer.clone(), lexicon: Some(lexicon), ..other })
     }
 
     /// Ends the running episode when the process is interrupted from the keyboard.
@@ -153,12 +166,9 @@ impl Runner {
         config: &EpisodeConfig,
         journal: Arc<dyn Journal<Message>>,
     ) -> anyhow::Result<EpisodeResult> {
-        let Some(request) = &config.trace else { return self.episode(scenario, seed, config, journal, None) };
-        let recording = Recording::begin(request, scenario, seed, config, &self.adapter())?;
-        let result = self.episode(scenario, seed, config, journal, Some(recording.trace()));
-        let finished = recording.end(&result);
-        // What went wrong first is what is told.
-        result.and_then(|result| finished.map(|()| result))
+        let sensor = config.sensor.as_deref().unwrap_or_else(|| scenario.sensor());
+        let stage = Stage { world: scenario.name(), sensor, renderer: &self.adapter() };
+        recorded(&stage, seed, config, |trace| self.episode(scenario, seed, config, journal, trace))
     }
 
     fn episode(
@@ -198,9 +208,22 @@ impl Runner {
         config: &EpisodeConfig,
         journal: Arc<dyn Journal<Message>>,
     ) -> anyhow::Result<EpisodeResult> {
+        let world = robot.address().to_string();
+        let stage = Stage { world: &world, sensor: "the host's", renderer: "the host's" };
+        recorded(&stage, seed, config, |trace| self.episode_remote(robot, seed, config, journal, trace))
+    }
+
+    fn episode_remote(
+        &self,
+        robot: &RemoteRobot,
+        seed: u64,
+        config: &EpisodeConfig,
+        journal: Arc<dyn Journal<Message>>,
+        trace: Option<Arc<Trace>>,
+    ) -> anyhow::Result<EpisodeResult> {
         let started = now();
         let outside = Outside { embodiment: robot.embodiment(), cameras: robot.camera(), clock: robot.clock() };
-        let mut lived = self.live(robot.task().clone(), outside, seed, config, journal, None)?;
+        let mut lived = self.live(robot.task().clone(), outside, seed, config, journal, trace)?;
         let verdict = match &lived.report.ending {
             // Nobody has done anything yet that could be judged, and a lost host judges nothing.
             Ending::Until { .. } | Ending::Broken { .. } => Ok(None),
@@ -228,6 +251,7 @@ impl Runner {
         let agent = Agent::builder(Arc::clone(&self.library), memory)
             .on_unknown(config.on_unknown)
             .seed(seed)
+            .lexicon(self.lexicon.clone())
             .wipe_at(config.faults.wipe_at.clone())
             .until(config.until)
             .journal(journal)
@@ -252,6 +276,21 @@ impl Runner {
         }
         Ok(Lived { report: run.report, spent_s, commands: commands.load(Ordering::Relaxed) })
     }
+}
+
+/// Runs an episode into a trace, where one is wanted.
+fn recorded(
+    stage: &Stage<'_>,
+    seed: u64,
+    config: &EpisodeConfig,
+    run: impl FnOnce(Option<Arc<Trace>>) -> anyhow::Result<EpisodeResult>,
+) -> anyhow::Result<EpisodeResult> {
+    let Some(request) = &config.trace else { return run(None) };
+    let recording = Recording::begin(request, stage, seed, config)?;
+    let result = run(Some(recording.trace()));
+    let finished = recording.end(&result);
+    // What went wrong first is what is told.
+    result.and_then(|result| finished.map(|()| result))
 }
 
 /// An episode before it is judged.

@@ -4,7 +4,8 @@ use crate::{
     cli::{Exit, RunArgs},
     episode::Runner,
     narrate::Narrator,
-    run::{Source, exit_of, prepare, tell_result},
+    run::{Source, exit_of, filmed, prepare, tell_result, traced},
+    video::VideoFile,
 };
 use acm_actors::{
     message::Message,
@@ -18,11 +19,16 @@ use std::{io::Write, sync::Arc};
 /// The name under which the agent says hello.
 const AGENT: &str = concat!("acm ", env!("CARGO_PKG_VERSION"));
 
+/// What a trace in a folder is named after: an address is no name of a file.
+const FILE_STEM: &str = "robot";
+
 /// Runs one episode on the robot that `args` names.
 pub fn run(args: &RunArgs) -> anyhow::Result<Exit> {
     let address = args.robot.as_ref().context("no robot is named")?;
     ensure!(!args.seed.range, "a robot has one world at a time: give one seed, not a range");
+    let video = args.video.as_deref().map(|path| VideoFile::create(path, false)).transpose()?;
     let (config, library) = prepare(args)?;
+    let config = traced(FILE_STEM, args, &config, args.seed.first);
     ensure!(
         config.faults.slip_at.is_none(),
         "slip@N happens in the world: give it to its host, such as `acm sim serve --inject slip@N`"
@@ -44,7 +50,9 @@ pub fn run(args: &RunArgs) -> anyhow::Result<Exit> {
             Arc::new(Narrator::new(Box::new(std::io::stdout())))
         }
     };
-    let result = runner.run_remote(&robot, args.seed.first, &config, journal)?;
+    let result = filmed(&runner, video, config, journal, |config, journal| {
+        runner.run_remote(&robot, args.seed.first, config, journal)
+    })?;
     tell_result(&Source { name: &address.to_string(), sensor: "the host's" }, args, &result)?;
     if let Ending::Broken { reason } = &result.report.ending {
         eprintln!("acm: the run broke off: {reason}");

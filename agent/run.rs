@@ -65,24 +65,34 @@ fn one(
     config: &EpisodeConfig,
     video: Option<VideoFile>,
 ) -> anyhow::Result<Exit> {
-    let mut config = traced(scenario, args, config, args.seed.first);
-    let mut journal: Arc<dyn Journal<Message>> = if args.json {
+    let config = traced(scenario.name(), args, config, args.seed.first);
+    let journal: Arc<dyn Journal<Message>> = if args.json {
         Arc::new(NoJournal)
     } else {
         println!("{} seed {}: {}", scenario.name(), args.seed.first, scenario.summary());
         Arc::new(Narrator::new(Box::new(std::io::stdout())))
     };
-    let camera = Arc::new(Camera::new(Arc::clone(runner.library())));
-    if video.is_some() {
-        config.frames = Some(camera.tap());
-        journal = Arc::new(Both(journal, Arc::clone(&camera) as Arc<dyn Journal<Message>>));
-    }
-    let result = runner.run(scenario, args.seed.first, &config, journal)?;
-    if let Some(video) = video {
-        video.write(&camera.pictures(ending_of(&result)))?;
-    }
+    let result = filmed(runner, video, config, journal, |config, journal| {
+        runner.run(scenario, args.seed.first, config, journal)
+    })?;
     tell_result(&Source::of(scenario, args), args, &result)?;
     Ok(exit_of(&result))
+}
+
+/// Runs an episode and draws it, where that is wanted.
+pub(crate) fn filmed(
+    runner: &Runner,
+    video: Option<VideoFile>,
+    config: EpisodeConfig,
+    journal: Arc<dyn Journal<Message>>,
+    run: impl FnOnce(&EpisodeConfig, Arc<dyn Journal<Message>>) -> anyhow::Result<EpisodeResult>,
+) -> anyhow::Result<EpisodeResult> {
+    let Some(video) = video else { return run(&config, journal) };
+    let camera = Arc::new(Camera::new(Arc::clone(runner.library())));
+    let config = EpisodeConfig { frames: Some(camera.tap()), ..config };
+    let result = run(&config, Arc::new(Both(journal, Arc::clone(&camera) as Arc<dyn Journal<Message>>)))?;
+    video.write(&camera.pictures(ending_of(&result)))?;
+    Ok(result)
 }
 
 /// Prints what one episode came to.
@@ -102,7 +112,7 @@ fn many(runner: &Runner, scenario: &Scenario, args: &RunArgs, config: &EpisodeCo
     let bar = progress(count, args.json);
     let mut results = Vec::new();
     for seed in args.seed.first..=args.seed.last {
-        let result = runner.run(scenario, seed, &traced(scenario, args, config, seed), Arc::new(NoJournal))?;
+        let result = runner.run(scenario, seed, &traced(scenario.name(), args, config, seed), Arc::new(NoJournal))?;
         tell(&bar, args.json, &line(&result))?;
         bar.inc(1);
         let interrupted = result.report.ending == Ending::Interrupted;
@@ -126,9 +136,8 @@ fn many(runner: &Runner, scenario: &Scenario, args: &RunArgs, config: &EpisodeCo
 }
 
 /// The configuration of one seed: its trace is a file of its own.
-fn traced(scenario: &Scenario, args: &RunArgs, config: &EpisodeConfig, seed: u64) -> EpisodeConfig {
-    let request =
-        |target| TraceRequest::for_seed(target, args.trace_frames, config, scenario.name(), seed, args.seed.range);
+pub(crate) fn traced(world: &str, args: &RunArgs, config: &EpisodeConfig, seed: u64) -> EpisodeConfig {
+    let request = |target| TraceRequest::for_seed(target, args.trace_frames, config, world, seed, args.seed.range);
     EpisodeConfig { trace: args.trace.as_deref().map(request), ..config.clone() }
 }
 

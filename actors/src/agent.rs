@@ -20,7 +20,7 @@ use acm_concept::{
 };
 use acm_memory::Memory;
 use acm_perception::{Grounder, GrounderConfig};
-use acm_planner::{PlanOptions, Planner};
+use acm_planner::{Lexicon, PlanOptions, Planner};
 use acm_runtime::{
     envelope::Role,
     frame_bus::{FrameBus, InProcessBus},
@@ -63,6 +63,7 @@ pub struct AgentBuilder {
     on_unknown: OnUnknown,
     seed: u64,
     grounder: GrounderConfig,
+    lexicon: Option<Lexicon>,
     journal: Arc<dyn Journal<Message>>,
     trace: Option<Arc<Trace>>,
     wipe_at: Option<WipeAt>,
@@ -84,6 +85,11 @@ impl AgentBuilder {
     /// Thresholds of perception.
     pub fn grounder(mut self, config: GrounderConfig) -> Self {
         self.grounder = config;
+        self
+    }
+    /// Another lexicon than the one that ships inside the binary.
+    pub fn lexicon(mut self, lexicon: Option<Lexicon>) -> Self {
+        self.lexicon = lexicon;
         self
     }
     /// Where messages are written before they are handled.
@@ -112,9 +118,9 @@ impl AgentBuilder {
         self
     }
     /// The agent.
-    pub fn build(self) -> Result<Agent, AgentError> {
-        let planner = Arc::new(Planner::new()?);
-        Ok(Agent { parts: self, planner })
+    pub fn build(mut self) -> Result<Agent, AgentError> {
+        let planner = self.lexicon.take().map_or_else(Planner::new, |lexicon| Ok(Planner::with_lexicon(lexicon)))?;
+        Ok(Agent { parts: self, planner: Arc::new(planner) })
     }
 }
 
@@ -153,6 +159,7 @@ impl Agent {
             on_unknown: OnUnknown::default(),
             seed: 0,
             grounder: GrounderConfig::default(),
+            lexicon: None,
             journal: Arc::new(NoJournal),
             trace: None,
             wipe_at: None,

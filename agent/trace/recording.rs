@@ -3,7 +3,6 @@
 use crate::episode::{EpisodeConfig, EpisodeResult};
 use acm_actors::trace::{FrameDetail, Trace};
 use acm_runtime::trace::{TraceOptions, TraceWriter, hash};
-use acm_sim::Scenario;
 use anyhow::Context;
 use std::{
     collections::BTreeMap,
@@ -27,18 +26,18 @@ pub struct TraceRequest {
 
 impl TraceRequest {
     /// The request for one seed. In a folder (one that exists, or a path that ends with a slash) each run has a file
-    /// named after scenario, method and seed; of a range, each run has its seed before the file's extension.
+    /// named after its world, method and seed; of a range, each run has its seed before the file's extension.
     pub fn for_seed(
         target: &Path,
         frames: FrameDetail,
         config: &EpisodeConfig,
-        scenario: &str,
+        world: &str,
         seed: u64,
         range: bool,
     ) -> TraceRequest {
         let folder = target.is_dir() || target.to_string_lossy().ends_with(std::path::MAIN_SEPARATOR);
         let path = match (folder, range) {
-            (true, _) => target.join(format!("{scenario}-{}-{seed}.mcap", config.method)),
+            (true, _) => target.join(format!("{world}-{}-{seed}.mcap", config.method)),
             (false, true) => numbered(target, seed),
             (false, false) => target.to_path_buf(),
         };
@@ -55,6 +54,17 @@ fn numbered(path: &Path, seed: u64) -> PathBuf {
     path.with_file_name(name)
 }
 
+/// Where a run takes place, as its trace tells of it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Stage<'a> {
+    /// The scenario, or the address of a robot.
+    pub world: &'a str,
+    /// The sensor profile.
+    pub sensor: &'a str,
+    /// What draws the pictures.
+    pub renderer: &'a str,
+}
+
 /// A trace that is open for one run.
 pub struct Recording {
     trace: Arc<Trace>,
@@ -64,10 +74,9 @@ impl Recording {
     /// Opens the file and says in it what is about to be run. Fails before the episode if nothing can be written.
     pub fn begin(
         request: &TraceRequest,
-        scenario: &Scenario,
+        stage: &Stage<'_>,
         seed: u64,
         config: &EpisodeConfig,
-        adapter: &str,
     ) -> anyhow::Result<Recording> {
         let folder = request.path.parent().filter(|folder| !folder.as_os_str().is_empty());
         if let Some(folder) = folder {
@@ -75,16 +84,15 @@ impl Recording {
                 .with_context(|| format!("the folder {} cannot be made", folder.display()))?;
         }
         let writer = Arc::new(TraceWriter::create(&request.path, TraceOptions::default())?);
-        let options = serde_json::to_vec_pretty(&options(scenario, config))?;
-        let sensor = config.sensor.as_deref().unwrap_or_else(|| scenario.sensor());
+        let options = serde_json::to_vec_pretty(&options(stage.world, config))?;
         let about = [
             ("version", env!("CARGO_PKG_VERSION")),
             ("commit", option_env!("ACM_COMMIT").unwrap_or("unknown")),
-            ("scenario", scenario.name()),
+            ("scenario", stage.world),
             ("method", &config.method),
             ("seed", &seed.to_string()),
-            ("sensor", sensor),
-            ("renderer", adapter),
+            ("sensor", stage.sensor),
+            ("renderer", stage.renderer),
             ("config_blake3", &hash(&options)),
         ];
         let about: BTreeMap<String, String> = about.map(|(name, value)| (name.into(), value.into())).into();
@@ -120,9 +128,9 @@ impl Recording {
 }
 
 /// What the run was told, but for its seed: equal for runs that may be compared seed by seed.
-fn options(scenario: &Scenario, config: &EpisodeConfig) -> serde_json::Value {
+fn options(world: &str, config: &EpisodeConfig) -> serde_json::Value {
     serde_json::json!({
-        "scenario": scenario.name(),
+        "scenario": world,
         "method": config.method,
         "on_unknown": config.on_unknown,
         "instruction": config.instruction,

@@ -5,6 +5,7 @@
 //! | `arrows` | which crate may know which other |
 //! | `licences` | that everything we build on fits Apache-2.0 OR MIT |
 //! | `names` | that the agent's source names no scenario and no object of the simulator |
+//! | `models` | that the simulator's object models share nothing with the agent's templates |
 //! | `invariants` | that each proof which ARCHITECTURE.md names is a test that exists |
 //! | `guides` | that the examples and tables of docs/ are true |
 
@@ -12,6 +13,7 @@ mod arrows;
 mod guides;
 mod invariants;
 mod licences;
+mod models;
 mod names;
 
 use anyhow::{Context, Result};

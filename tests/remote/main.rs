@@ -7,3 +7,4 @@ mod hunted;
 mod journal;
 mod kills;
 mod python;
+mod stapler;

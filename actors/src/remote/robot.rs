@@ -85,6 +85,7 @@ pub struct RemoteRobot {
     host: String,
     robot: RobotDescription,
     task: TaskSpec,
+    address: Address,
     carrier: Carrier,
     fallback: Option<String>,
 }
@@ -119,6 +120,7 @@ impl RemoteRobot {
             host: welcome.host,
             robot: welcome.robot,
             task: welcome.task,
+            address: address.clone(),
             fallback,
         })
     }
@@ -126,6 +128,10 @@ impl RemoteRobot {
     /// The task that the host sets.
     pub fn task(&self) -> &TaskSpec {
         &self.task
+    }
+    /// Where it was reached.
+    pub fn address(&self) -> &Address {
+        &self.address
     }
     /// The host's name for itself.
     pub fn host(&self) -> &str {

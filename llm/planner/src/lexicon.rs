@@ -166,6 +166,7 @@ pub struct Lexicon {
 
 impl Lexicon {
     /// Reads a lexicon from named texts: `words.toml`, `nouns.toml`, `colors.toml`, `verbs.toml`, `history.toml`.
+    /// [`embedded_lexicon`](crate::embedded_lexicon) gives those that ship inside the binary, to begin with.
     pub fn parse(files: &BTreeMap<String, String>) -> Result<Lexicon, LexiconError> {
         raw::parse(files)
     }

@@ -31,5 +31,5 @@ pub use decision::{Decision, GiveUpCause, PlanOptions, Situation, Step, Unknown}
 pub use explanation::{Explanation, Rejected, ResolvedReference};
 pub use language::ParseError;
 pub use lexicon::{Lexicon, LexiconError};
-pub use planner::Planner;
+pub use planner::{Planner, embedded_lexicon};
 pub use task::{Destination, Goal, ObjectReference, Span, Subtask, Task};

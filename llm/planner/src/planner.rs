@@ -15,8 +15,8 @@ use std::collections::BTreeMap;
 
 static LEXICON: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/lexicon");
 
-/// The texts of the lexicon that ships inside the binary, by file name.
-pub(crate) fn embedded_lexicon() -> BTreeMap<String, String> {
+/// The texts of the lexicon that ships inside the binary, by file name: what [`Lexicon::parse`] reads.
+pub fn embedded_lexicon() -> BTreeMap<String, String> {
     let text =
         |file: &include_dir::File<'_>| Some((file.path().to_str()?.to_owned(), file.contents_utf8()?.to_owned()));
     LEXICON.files().filter_map(text).collect()
