@@ -17,7 +17,7 @@ use glam::DVec3;
 use std::collections::BTreeMap;
 
 /// Below this probability of being the object asked for, the answer is open between the identities.
-const SURE_IDENTITY: f64 = 0.85;
+const SURE_IDENTITY: f64 = 0.95;
 /// A place counts as able to carry a thing if it is at least this large, relative to the thing's base.
 const CARRIES: f64 = 0.8;
 /// How far from a recalled place still counts as there, metres.
