@@ -192,9 +192,12 @@ pub struct DemoArgs {
     /// The episode's seed.
     #[arg(long, default_value_t = 7)]
     pub seed: u64,
-    /// Where the demo leaves its memory and pictures.
+    /// Where the demo leaves its page, its traces and its memory.
     #[arg(long, value_name = "DIR", default_value = "out/demo")]
     pub out: PathBuf,
+    /// Also write four pictures of the story, with captions, into this file (.png or .jpg).
+    #[arg(long, value_name = "FILE")]
+    pub picture: Option<PathBuf>,
 }
 
 /// Arguments of `acm perceive`.
