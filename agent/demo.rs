@@ -43,9 +43,8 @@ use watch::Watch;
 const SCENARIO: &str = "return-stapler";
 /// A further seed is only begun if it can be expected to end before this much of the minute is over, seconds.
 const MINUTE_S: f64 = 52.0;
-const MORE_SEEDS: u64 = 4;
 /// Width of the lines up to a remark at their end, columns.
-const COLUMN: usize = 76;
+const COLUMN: usize = 84;
 
 /// Runs `acm demo`.
 pub fn run(args: &DemoArgs) -> anyhow::Result<Exit> {
@@ -80,7 +79,8 @@ impl<'a> Demo<'a> {
 
     fn tell(self) -> anyhow::Result<Exit> {
         let (seed, adapter) = (self.args.seed, self.runner.adapter());
-        say(&format!("ACM demo   no GPU, no key, no network at run time   seed {seed}   renderer: {adapter}"))?;
+        let drawn_by = adapter.split(" (").next().unwrap_or(&adapter);
+        say(&format!("ACM demo   no GPU, no key, no network at run time   seed {seed}   renderer: {drawn_by}"))?;
         let cards = Arc::new(Cards::default());
         let told = self.with_memory(&cards)?;
         let wiped = self.without_memory()?;
@@ -107,9 +107,10 @@ impl<'a> Demo<'a> {
         }
         let trace = self.trace_file("run.mcap");
         say(&format!(
-            "{:.0} s. Open {}   Next: acm trace show {} --step 2",
+            "{:.0} s. Open {}   Next: {} trace show {} --step 2",
             self.began.elapsed().as_secs_f64(),
             path.display(),
+            program(),
             trace.display()
         ))?;
         Ok(if told.result.solved && honest { Exit::Success } else { Exit::Failed })
@@ -127,11 +128,14 @@ impl<'a> Demo<'a> {
         let watching =
             EpisodeConfig { until: Some(Until::Instruction), trace: Some(self.trace("watch.mcap")), ..config.clone() };
         let teller = Arc::new(Watch::new(Box::new(std::io::stdout()), Arc::clone(cards)));
-        self.runner.run_in(&world, &watching, both(teller, &reel))?;
+        self.runner.run_in(&world, &watching, both(Arc::clone(&teller) as Arc<dyn Journal<Message>>, &reel))?;
+        for line in teller.at_rest() {
+            say(&line)?;
+        }
         let moved = world.simulation().truth();
         self.restarted()?;
         reel.chapter(Chapter::Ask);
-        let why = format!("acm trace show {} --step 1", self.trace_file("run.mcap").display());
+        let why = format!("{} trace show {} --step 1", program(), self.trace_file("run.mcap").display());
         let teller = Arc::new(Deed::new(Box::new(std::io::stdout()), why));
         let asked = EpisodeConfig { trace: Some(self.trace("run.mcap")), ..config };
         let result = self.runner.run_in(&world, &asked, both(teller, &reel))?;
@@ -176,12 +180,11 @@ impl<'a> Demo<'a> {
         };
         let gave_up = matches!(result.report.ending, Ending::GaveUp { .. });
         let verdict = match (gave_up, moved) {
-            (true, 0) => "moved nothing   HONEST FAILURE",
-            (true, _) => "GAVE UP, but moved",
+            (true, 0) => "moves nothing   HONEST FAILURE",
+            (true, _) => "GAVE UP, BUT MOVED",
             (false, _) => "NOT HONEST",
         };
-        say(&below(&format!("\"{said}\"")))?;
-        say(&below(verdict))?;
+        say(&below(&format!("\"{said}\"   {verdict}")))?;
         reel.end(&format!("\"{said}\" {verdict}"));
         let truth = Truth::new(&before, &before, &world.simulation().truth());
         Ok(Told { result, truth, pictures: reel.take() })
@@ -201,11 +204,11 @@ impl<'a> Demo<'a> {
         let (mut asked, mut with, mut without) = (0, 0, 0);
         let seed = self.args.seed;
         let mut longest_s = one_s;
-        for seed in seed + 1..=seed + MORE_SEEDS {
+        for seed in seed + 1..=seed + self.args.more_seeds {
             if self.began.elapsed().as_secs_f64() + 1.2 * longest_s > MINUTE_S {
                 break;
             }
-            eprint!("acm: seed {seed} ...\r");
+            eprintln!("acm: seed {seed}, with memory and with the last frame only");
             let started = now();
             let config = EpisodeConfig { method: "acm".into(), ..Default::default() };
             with += usize::from(self.runner.run(&self.scenario, seed, &config, Arc::new(NoJournal))?.solved);
@@ -219,7 +222,10 @@ impl<'a> Demo<'a> {
         if asked == 0 {
             return Ok(None);
         }
-        let seeds = format!("seeds {}..{}:", seed + 1, seed + asked as u64);
+        let seeds = match asked {
+            1 => format!("seed {}:", seed + 1),
+            _ => format!("seeds {} to {}:", seed + 1, seed + asked as u64),
+        };
         say(&below(&format!("{seeds}  with memory {with}/{asked}   last frame only {without}/{asked}")))?;
         Ok(Some([asked, with, without]))
     }
@@ -248,6 +254,11 @@ impl<'a> Demo<'a> {
     fn trace(&self, name: &str) -> TraceRequest {
         TraceRequest { path: self.trace_file(name), frames: FrameDetail::Thumbnail }
     }
+}
+
+/// The name under which this program can be called again: as it was called, where that is short.
+fn program() -> String {
+    std::env::args().next().filter(|name| name.len() <= 24).unwrap_or_else(|| "acm".into())
 }
 
 /// Prints a line at once.

@@ -86,7 +86,8 @@ impl Told {
                 self.decided = true;
                 let view = self.view.as_ref().map(|view| &*view.0);
                 let mut lines: Vec<String> = reasons(explanation, view).iter().map(|line| super::below(line)).collect();
-                lines.push(super::noted(&plan(step, explanation), &self.why));
+                lines.push(super::below(&plan(step, explanation)));
+                lines.push(super::below(&format!("why?    {}", self.why)));
                 lines
             }
             Decision::GiveUp { unknown } => vec![super::below(&format!("GIVES UP: \"{}\"", unknown.text))],
@@ -98,11 +99,11 @@ impl Told {
         let report = self.ended.take()?;
         let primitives: Vec<String> = report.primitives.iter().map(|p| p.primitive.to_string()).collect();
         let invocation = &report.invocation;
-        let felt = format!("{:.1} N at the fingers", self.grip_n);
-        let done = format!("{} {}   {}   {felt}", invocation.skill, invocation.part.object, primitives.join(" "));
+        let felt = report.held.map_or_else(String::new, |_| format!("   {:.0} N at the fingers", self.grip_n));
+        let done = format!("{} {}   {}{felt}", invocation.skill, invocation.part.object, primitives.join(" "));
         // What was compared with a frame, rather than with the hand.
         let looked = verdict.literals.iter().map(|l| &l.observed.reason).find(|reason| reason.contains(" mm "));
-        let looked = looked.map_or_else(String::new, |reason| format!("; looked again: {}", short(reason)));
+        let looked = looked.map_or_else(String::new, |reason| format!("   looked again: {}", short(reason)));
         let word = match verdict.outcome {
             Outcome::Verified => "VERIFIED",
             Outcome::Contradicted => "CONTRADICTED",
@@ -127,7 +128,7 @@ pub fn reasons(explanation: &Explanation, view: Option<&dyn MemoryView>) -> Vec<
         if let (Some(place), Some(Recall::Known { confidence, evidence, .. })) = (&reference.place, &reference.recall) {
             let evidence: Vec<String> = evidence.iter().map(crate::demo::evidence_words).collect();
             let spot = words::spot(place.pose.translation);
-            lines.push(format!("where?  {spot}, {confidence:.2} sure, proved by {}", evidence.join(" and ")));
+            lines.push(format!("where?  {spot}, {confidence:.2} sure, by {}", evidence.join(" and ")));
         }
     }
     lines
@@ -147,8 +148,8 @@ fn plan(step: &Step, explanation: &Explanation) -> String {
     let conditions = &explanation.applicability.conditions;
     let hold = conditions.iter().filter(|(_, belief)| belief.truth == Truth::Yes).count();
     format!(
-        "plan    {}; {hold} of {} preconditions hold, success {:.2}",
-        explanation.plan.join(", ").replace(", place", ", then place"),
+        "plan    {}; {hold} of {} preconditions hold; predicted {:.2}",
+        explanation.plan.join(", then "),
         conditions.len(),
         step.prediction.success
     )

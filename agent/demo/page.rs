@@ -15,7 +15,7 @@ const TEMPLATE: &str = include_str!("page.html");
 /// Where the data goes.
 const DATA: &str = "{{DATA}}";
 /// JPEG quality of steps and of cut-outs, 0-100.
-const QUALITY: u8 = 70;
+const QUALITY: u8 = 80;
 /// Largest page, bytes.
 const MAX_BYTES: usize = 6_000_000;
 

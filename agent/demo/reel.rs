@@ -26,7 +26,7 @@ use std::{
 };
 
 /// Of the frames in which nothing happens, every so many-th is kept.
-const EVERY: u64 = 6;
+const EVERY: u64 = 4;
 /// Most steps that are kept; what comes later is left out.
 const MAX_STEPS: usize = 60;
 /// Room round an object in its picture, pixels.
@@ -93,8 +93,10 @@ struct Rolls {
     /// Cut-outs of each object in each frame that was watched.
     crops: BTreeMap<(FrameId, ObjectId), RgbImage>,
     percepts: Option<Percepts>,
-    last: Option<(Scene, FrameId, Vec<ObjectId>)>,
-    presences: BTreeMap<ObjectId, &'static str>,
+    last: Option<(Scene, FrameId)>,
+    /// Whether a skill was just written down.
+    recorded: bool,
+    states: BTreeMap<ObjectId, &'static str>,
     skills: usize,
 }
 
@@ -150,8 +152,9 @@ impl Journal<Message> for Reel {
                 }
             }
             Message::Decided { decision, .. } => rolls.decided(decision, time_s),
-            Message::Kept { transition: Some(_), view } => {
-                rolls.add("done; now it is looked whether it is so".into(), Some(view), time_s, &self.library);
+            Message::Record(_) => rolls.recorded = true,
+            Message::Kept { view, .. } if std::mem::take(&mut rolls.recorded) => {
+                rolls.add("done so, it believes: is it as predicted?".into(), Some(view), time_s, &self.library);
             }
             Message::Verdict { verdict, .. } => {
                 let word = match verdict.outcome {
@@ -178,30 +181,38 @@ impl Rolls {
         library: &TemplateLibrary,
     ) {
         let id = frame.header.id;
-        let seen: Vec<ObjectId> = grounding.resolved.iter().map(|resolved| resolved.object).collect();
         if self.chapter == Chapter::Watch {
             self.cut_out(frame, percepts, grounding);
         }
-        let news = self.news(&*view.0, &seen);
+        let scene = Scene::new(frame, percepts, grounding, library);
+        let news = self.news(&*view.0, &scene, grounding);
         if news.is_empty() && self.chapter == Chapter::Watch && !id.0.is_multiple_of(EVERY) {
             return;
         }
-        self.last = Some((Scene::new(frame, percepts, grounding, library), id, seen));
-        let caption = if news.is_empty() { "nothing new".into() } else { news.join("; ") };
+        self.last = Some((scene, id));
+        let unknown = self.states.iter().filter(|(_, state)| **state == "unknown");
+        let unknown: Vec<String> = unknown.map(|(id, _)| format!("{id} is not where it was; where now?")).collect();
+        let caption = match (news.is_empty(), unknown.is_empty()) {
+            (false, _) => news.join("; "),
+            (true, true) => format!("{} things in sight, nothing new", grounding.resolved.len()),
+            (true, false) => unknown.join(", "),
+        };
         self.add(caption, Some(view), time_s, library);
     }
 
-    /// Objects whose state or place changed since the last frame.
-    fn news(&mut self, view: &dyn MemoryView, seen: &[ObjectId]) -> Vec<String> {
+    /// Objects whose state changed since the last frame, or that were seen to move.
+    fn news(&mut self, view: &dyn MemoryView, scene: &Scene, grounding: &Grounding) -> Vec<String> {
         let mut news = Vec::new();
         for object in view.objects() {
-            let state = state(object, seen);
-            let before = self.presences.insert(object.id, state);
-            match before {
-                None => news.push(format!("{} {} is new", object.id, object.category)),
-                Some(before) if before != state => news.push(format!("{} is {state} now, was {before}", object.id)),
-                Some(_) => {}
-            }
+            let (id, state) = (object.id, state(object, scene));
+            let before = self.states.insert(id, state);
+            news.extend(match (before, state) {
+                (None, _) => Some(format!("{id} {} is new", object.category)),
+                (Some("unknown"), "seen") => Some(format!("{id} is in sight again")),
+                (Some("seen" | "believed"), "unknown") => Some(format!("{id} is not where it was; where now?")),
+                _ if grounding.moved.contains(&id) => Some(format!("{id} was moved, not by me")),
+                _ => None,
+            });
         }
         news
     }
@@ -241,11 +252,11 @@ impl Rolls {
     }
 
     fn add(&mut self, caption: String, view: Option<&View>, time_s: f64, library: &TemplateLibrary) {
-        let (Some(view), Some((scene, frame, seen))) = (view, &self.last) else { return self.repeat(caption, time_s) };
+        let (Some(view), Some((scene, frame))) = (view, &self.last) else { return self.repeat(caption, time_s) };
         if self.steps.len() >= MAX_STEPS {
             return;
         }
-        let rows = view.0.objects().iter().map(|object| row(object, seen, library)).collect();
+        let rows = view.0.objects().iter().map(|object| row(object, scene, library)).collect();
         self.steps.push(Step {
             chapter: self.chapter,
             time_s,
@@ -257,16 +268,16 @@ impl Rolls {
     }
 }
 
-fn state(object: &ObjectEntry, seen: &[ObjectId]) -> &'static str {
+fn state(object: &ObjectEntry, scene: &Scene) -> &'static str {
     match object.presence {
         Presence::Held => "held",
         Presence::Missing => "unknown",
-        Presence::Present if seen.contains(&object.id) => "seen",
+        Presence::Present if scene.shows(object) => "seen",
         Presence::Present => "believed",
     }
 }
 
-fn row(object: &ObjectEntry, seen: &[ObjectId], library: &TemplateLibrary) -> ObjectRow {
+fn row(object: &ObjectEntry, scene: &Scene, library: &TemplateLibrary) -> ObjectRow {
     let place = object.pose().map(|pose| [pose.translation.x, pose.translation.y]);
     ObjectRow {
         id: object.id.to_string(),
@@ -279,7 +290,7 @@ fn row(object: &ObjectEntry, seen: &[ObjectId], library: &TemplateLibrary) -> Ob
             (Presence::Present, Some(id)) => id.to_string(),
             (Presence::Present, None) => "the table".into(),
         },
-        state: state(object, seen),
+        state: state(object, scene),
         confidence: object.confidence,
     }
 }

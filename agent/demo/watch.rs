@@ -51,6 +51,7 @@ struct Seen {
     /// Frames in a row that did not show it.
     unseen: u32,
     first_unseen: Option<FrameId>,
+    last_unseen: Option<FrameId>,
     /// Whether it is told that it is hidden.
     hidden: bool,
     moved: bool,
@@ -62,6 +63,19 @@ impl Watch {
     /// Tells into `sink`, and keeps for the page which frames prove what.
     pub fn new(sink: Box<dyn Write + Send>, cards: Arc<Cards>) -> Watch {
         Watch { told: Mutex::new(Told { sink, percepts: None, objects: BTreeMap::new() }), cards }
+    }
+}
+
+impl Watch {
+    /// Where the things that were moved have come to rest.
+    pub fn at_rest(&self) -> Vec<String> {
+        let told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
+        let line = |(id, seen): (&ObjectId, &Seen)| {
+            let frame = seen.moved_in.filter(|_| seen.moved)?;
+            let text = format!("rests   {id} at {}, last seen to move in {frame}", words::spot(seen.at));
+            Some(super::below(&text))
+        };
+        told.objects.iter().filter_map(line).collect()
     }
 }
 
@@ -129,7 +143,7 @@ impl Told {
             return Some(format!("saw     {text}{twin}"));
         };
         seen.at = at;
-        (seen.unseen, seen.first_unseen) = (0, None);
+        seen.unseen = 0;
         let moves = object.history.len() > 1 && object.history.last().is_some_and(|h| h.cause == seen_in(frame));
         if moves {
             seen.moved_in = Some(frame);
@@ -137,7 +151,9 @@ impl Told {
         // Memory takes nothing for the same thing again before a second view agrees.
         if seen.hidden && object.presence == Presence::Present {
             seen.hidden = false;
-            let text = format!("{id} {} comes out at {}", object.category, words::spot(at));
+            let unseen = seen.first_unseen.take().zip(seen.last_unseen.take());
+            let unseen = unseen.map_or_else(String::new, |(first, last)| format!("; not seen in {first} to {last}"));
+            let text = format!("{id} {} comes out at {}{unseen}", object.category, words::spot(at));
             cards.add(Card::new(id, frame, "seen again", &text));
             return Some(format!("again   {text}"));
         }
@@ -162,7 +178,10 @@ impl Told {
         let frame = percepts.frame.id;
         let seen = self.objects.get_mut(&object.id)?;
         seen.unseen += 1;
-        seen.first_unseen.get_or_insert(frame);
+        if seen.unseen == 1 && !seen.hidden {
+            seen.first_unseen = Some(frame);
+        }
+        seen.last_unseen = Some(frame);
         if seen.hidden || seen.unseen < HIDDEN_FRAMES {
             return None;
         }

@@ -5,6 +5,7 @@ use acm_concept::{
     camera::{FrameHeader, RgbdFrame},
     ids::ObjectId,
     object::Percepts,
+    pose::Pose,
     template::TemplateLibrary,
 };
 use acm_memory::{
@@ -40,12 +41,17 @@ impl Scene {
         Scene { image, header: percepts.frame.clone(), seen }
     }
 
+    /// Whether the frame showed an object where it is believed to be.
+    pub fn shows(&self, object: &ObjectEntry) -> bool {
+        let near = |(pose, at): (Pose, &DVec3)| at.distance(pose.translation) < ELSEWHERE_M;
+        object.pose().zip(self.seen.get(&object.id)).is_some_and(near)
+    }
+
     /// The picture with dashed outlines where memory believes something that the frame did not show there.
     pub fn with_beliefs(&self, view: &dyn MemoryView, library: &TemplateLibrary) -> RgbImage {
         let mut image = self.image.clone();
         let mut held = 0;
         for object in view.objects() {
-            let Some(pose) = object.pose() else { continue };
             match object.presence {
                 Presence::Held => {
                     let label = format!("{} is in the hand", label(object));
@@ -53,12 +59,8 @@ impl Scene {
                     held += 1;
                 }
                 Presence::Missing => ghost::draw(&mut image, &self.header, object, library, &format!("{}?", object.id)),
-                Presence::Present => {
-                    let near = |at: &DVec3| at.distance(pose.translation) < ELSEWHERE_M;
-                    if !self.seen.get(&object.id).is_some_and(near) {
-                        ghost::draw(&mut image, &self.header, object, library, &label(object));
-                    }
-                }
+                Presence::Present if self.shows(object) => {}
+                Presence::Present => ghost::draw(&mut image, &self.header, object, library, &label(object)),
             }
         }
         image
