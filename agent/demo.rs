@@ -136,7 +136,7 @@ impl<'a> Demo<'a> {
         self.restarted()?;
         reel.chapter(Chapter::Ask);
         let why = format!("{} trace show {} --step 1", program(), self.trace_file("run.mcap").display());
-        let teller = Arc::new(Deed::new(Box::new(std::io::stdout()), why));
+        let teller = Arc::new(Deed::new(Box::new(std::io::stdout()), Arc::clone(cards), why));
         let asked = EpisodeConfig { trace: Some(self.trace("run.mcap")), ..config };
         let result = self.runner.run_in(&world, &asked, both(teller, &reel))?;
         let truth = Truth::new(&before, &moved, &world.simulation().truth());

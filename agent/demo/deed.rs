@@ -1,8 +1,14 @@
 //! Tells what the asked agent decides, does and verifies.
 
+use super::page::{Card, Cards};
 use crate::words;
 use acm_actors::message::Message;
-use acm_concept::{embodiment::Feedback, ids::ObjectId, literal::Truth, skill::SkillReport};
+use acm_concept::{
+    embodiment::Feedback,
+    ids::ObjectId,
+    literal::{Evidence, Truth},
+    skill::SkillReport,
+};
 use acm_memory::{
     MemoryView,
     observation::{Outcome, Verdict},
@@ -15,12 +21,13 @@ use acm_runtime::{
 };
 use std::{
     io::Write,
-    sync::{Mutex, PoisonError},
+    sync::{Arc, Mutex, PoisonError},
 };
 
 /// Listens to the agent that is asked.
 pub struct Deed {
     told: Mutex<Told>,
+    cards: Arc<Cards>,
 }
 
 struct Told {
@@ -36,17 +43,18 @@ struct Told {
 }
 
 impl Deed {
-    /// Tells into `sink`; `why` is the command with which the decision can be looked into.
-    pub fn new(sink: Box<dyn Write + Send>, why: String) -> Deed {
+    /// Tells into `sink`, and keeps the reasons for the page; `why` is the command with which the decision can be looked
+    /// into.
+    pub fn new(sink: Box<dyn Write + Send>, cards: Arc<Cards>, why: String) -> Deed {
         let told = Told { sink, view: None, decided: false, acted: false, grip_n: 0.0, ended: None, why };
-        Deed { told: Mutex::new(told) }
+        Deed { told: Mutex::new(told), cards }
     }
 }
 
 impl Journal<Message> for Deed {
     fn record(&self, message: &Envelope<Message>) -> Result<(), JournalError> {
         let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
-        for line in told.lines(&message.body) {
+        for line in told.lines(&message.body, &self.cards) {
             writeln!(told.sink, "{line}").map_err(|e| JournalError(e.to_string()))?;
         }
         told.sink.flush().map_err(|e| JournalError(e.to_string()))
@@ -54,14 +62,14 @@ impl Journal<Message> for Deed {
 }
 
 impl Told {
-    fn lines(&mut self, message: &Message) -> Vec<String> {
+    fn lines(&mut self, message: &Message, cards: &Cards) -> Vec<String> {
         match message {
             Message::Parse { instruction } => vec![super::headed("3 ASK", &format!("\"{instruction}\""))],
             Message::Decide { view, .. } => {
                 self.view = Some(view.clone());
                 Vec::new()
             }
-            Message::Decided { decision, .. } => self.decision(decision),
+            Message::Decided { decision, .. } => self.decision(decision, cards),
             Message::Execute(_) => {
                 self.grip_n = 0.0;
                 Vec::new()
@@ -80,12 +88,13 @@ impl Told {
         }
     }
 
-    fn decision(&mut self, decision: &Decision) -> Vec<String> {
+    fn decision(&mut self, decision: &Decision, cards: &Cards) -> Vec<String> {
         match decision {
             Decision::Act { step, explanation } if !self.decided => {
                 self.decided = true;
                 let view = self.view.as_ref().map(|view| &*view.0);
-                let mut lines: Vec<String> = reasons(explanation, view).iter().map(|line| super::below(line)).collect();
+                let mut lines: Vec<String> =
+                    reasons(explanation, view, cards).iter().map(|line| super::below(line)).collect();
                 lines.push(super::below(&plan(step, explanation)));
                 lines.push(super::below(&format!("why?    {}", self.why)));
                 lines
@@ -116,19 +125,32 @@ impl Told {
 }
 
 /// Which object and which place are meant, and why.
-pub fn reasons(explanation: &Explanation, view: Option<&dyn MemoryView>) -> Vec<String> {
-    let mut lines = Vec::new();
+fn reasons(explanation: &Explanation, view: Option<&dyn MemoryView>, cards: &Cards) -> Vec<String> {
+    let (mut lines, mut meant) = (Vec::new(), None);
     for reference in &explanation.references {
         if let (Some(object), Some(retrieval)) = (reference.object, &reference.retrieval) {
-            let others = retrieval.hits.iter().map(|hit| hit.object).filter(|other| *other != object);
-            let not: Vec<String> = others.filter_map(|other| why_not(other, view?)).collect();
+            meant = Some(object);
+            let mut not = Vec::new();
+            for other in retrieval.hits.iter().map(|hit| hit.object).filter(|other| *other != object) {
+                let Some(why) = view.and_then(|view| why_not(other, view)) else { continue };
+                cards.add(Card::latest(other, &format!("why not {other}?"), &why));
+                not.push(format!("not {other}: \"{why}\""));
+            }
             let not = if not.is_empty() { format!(": {}", reference.how) } else { format!(", {}", not.join(", ")) };
             lines.push(format!("which?  {object}{not}"));
         }
         if let (Some(place), Some(Recall::Known { confidence, evidence, .. })) = (&reference.place, &reference.recall) {
-            let evidence: Vec<String> = evidence.iter().map(crate::demo::evidence_words).collect();
-            let spot = words::spot(place.pose.translation);
-            lines.push(format!("where?  {spot}, {confidence:.2} sure, by {}", evidence.join(" and ")));
+            let grounds: Vec<String> = evidence.iter().map(super::evidence_words).collect();
+            let (spot, grounds) = (words::spot(place.pose.translation), grounds.join(" and "));
+            let first = evidence.iter().find_map(|evidence| match evidence {
+                Evidence::Frame(frame) => Some(*frame),
+                _ => None,
+            });
+            if let (Some(object), Some(frame)) = (meant, first) {
+                let text = format!("{object} was at {spot} before it was moved, {confidence:.2} sure, by {grounds}");
+                cards.add(Card::new(object, frame, "so it belongs there", &text));
+            }
+            lines.push(format!("where?  {spot}, {confidence:.2} sure, by {grounds}"));
         }
     }
     lines
@@ -137,9 +159,7 @@ pub fn reasons(explanation: &Explanation, view: Option<&dyn MemoryView>) -> Vec<
 /// Why a thing that fits the words as well is not meant: what memory says of its past.
 fn why_not(other: ObjectId, view: &dyn MemoryView) -> Option<String> {
     match view.recall_place(other, PlaceReference::BeforeMoved) {
-        Recall::Unknown { reason, .. } => {
-            Some(format!("not {other}: \"{}\"", reason.split(':').next().unwrap_or(&reason)))
-        }
+        Recall::Unknown { reason, .. } => Some(reason.split(':').next().unwrap_or(&reason).to_string()),
         Recall::Known { .. } => None,
     }
 }

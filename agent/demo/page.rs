@@ -42,7 +42,7 @@ pub struct Facts {
 #[derive(Debug, Clone)]
 pub struct Card {
     object: ObjectId,
-    frame: FrameId,
+    frame: Option<FrameId>,
     title: String,
     text: String,
 }
@@ -50,7 +50,11 @@ pub struct Card {
 impl Card {
     /// A reason: what a frame shows of an object.
     pub fn new(object: ObjectId, frame: FrameId, title: &str, text: &str) -> Card {
-        Card { object, frame, title: title.into(), text: text.into() }
+        Card { object, frame: Some(frame), title: title.into(), text: text.into() }
+    }
+    /// A reason about an object, with the last frame that was watched of it.
+    pub fn latest(object: ObjectId, title: &str, text: &str) -> Card {
+        Card { object, frame: None, title: title.into(), text: text.into() }
     }
 }
 
@@ -109,12 +113,16 @@ struct StepRow {
 impl Page {
     /// Puts the page together from what the two agents saw.
     pub fn new(facts: Facts, with: Reel, without: Reel, cards: &Cards) -> Page {
-        let card = |card: Card| CardRow {
-            image: with.crop(card.frame, card.object).map(|image| picture(&image)),
-            object: card.object.to_string(),
-            frame: card.frame.to_string(),
-            title: card.title,
-            text: card.text,
+        let card = |card: Card| {
+            let frame = card.frame.or_else(|| with.last_frame_of(card.object));
+            let crop = frame.and_then(|frame| with.crop(frame, card.object));
+            CardRow {
+                image: crop.map(|image| picture(&image)),
+                object: card.object.to_string(),
+                frame: frame.map_or_else(String::new, |frame| frame.to_string()),
+                title: card.title,
+                text: card.text,
+            }
         };
         let steps = [with.steps(), without.steps()];
         let run = |name, steps: &[Step]| RunRow { name, steps: rows(steps) };

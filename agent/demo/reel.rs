@@ -131,6 +131,11 @@ impl Reel {
     pub fn steps(&self) -> Vec<Step> {
         self.rolls.lock().unwrap_or_else(PoisonError::into_inner).steps.clone()
     }
+    /// The last frame that was watched and showed an object.
+    pub fn last_frame_of(&self, object: ObjectId) -> Option<FrameId> {
+        let rolls = self.rolls.lock().unwrap_or_else(PoisonError::into_inner);
+        rolls.crops.keys().filter(|(_, shown)| *shown == object).map(|(frame, _)| *frame).max()
+    }
     /// An object's pixels in a frame that was watched.
     pub fn crop(&self, frame: FrameId, object: ObjectId) -> Option<RgbImage> {
         self.rolls.lock().unwrap_or_else(PoisonError::into_inner).crops.get(&(frame, object)).cloned()
