@@ -5,7 +5,7 @@ target := $(or $(CARGO_TARGET_DIR),target)
 .PHONY: help setup demo test
 
 help:
-	@echo 'make demo   set up, build, and run one task, then the same task with its memory wiped'
+	@echo 'make demo   set up, build, and tell the first minute: one task with memory, then without; writes out/demo/index.html'
 	@echo 'make test   set up, build, and run all tests'
 
 setup:

@@ -192,9 +192,15 @@ pub struct DemoArgs {
     /// The episode's seed.
     #[arg(long, default_value_t = 7)]
     pub seed: u64,
-    /// Where the demo leaves its memory and pictures.
+    /// Where the demo leaves its page, its traces and its memory.
     #[arg(long, value_name = "DIR", default_value = "out/demo")]
     pub out: PathBuf,
+    /// Most further seeds; fewer are run where more would not fit into the minute.
+    #[arg(long, value_name = "N", default_value_t = 4)]
+    pub more_seeds: u64,
+    /// Also write four pictures of the story, with captions, into this file (.png or .jpg).
+    #[arg(long, value_name = "FILE")]
+    pub picture: Option<PathBuf>,
 }
 
 /// Arguments of `acm perceive`.

@@ -171,6 +171,40 @@ impl Runner {
         recorded(&stage, seed, config, |trace| self.episode(scenario, seed, config, journal, trace))
     }
 
+    /// A world that stays between the agents that live in it, one after the other; see [`Runner::run_in`].
+    ///
+    /// # Errors
+    /// The seed gives no world, or this runner has no renderer.
+    pub fn world<'s>(&self, scenario: &'s Scenario, seed: u64, config: &EpisodeConfig) -> anyhow::Result<World<'s>> {
+        let options = SimOptions {
+            seed,
+            slip_at: config.faults.slip_at,
+            sensor: config.sensor.clone(),
+            motion: !config.no_motion,
+            camera_size: None,
+        };
+        let simulation = Simulation::new(scenario, &options, self.renderer()?).context("the world cannot be built")?;
+        let digest = simulation.world_digest();
+        Ok(World { scenario, seed, simulation, digest })
+    }
+
+    /// Runs one agent in a world as the agents before it have left it.
+    ///
+    /// # Errors
+    /// As [`Runner::run`].
+    pub fn run_in(
+        &self,
+        world: &World<'_>,
+        config: &EpisodeConfig,
+        journal: Arc<dyn Journal<Message>>,
+    ) -> anyhow::Result<EpisodeResult> {
+        // An agent that has ended stopped its robot.
+        world.simulation.resume();
+        let sensor = config.sensor.as_deref().unwrap_or_else(|| world.scenario.sensor());
+        let stage = Stage { world: world.scenario.name(), sensor, renderer: &self.adapter() };
+        recorded(&stage, world.seed, config, |trace| self.live_in(world, config, journal, trace))
+    }
+
     fn episode(
         &self,
         scenario: &Scenario,
@@ -179,24 +213,30 @@ impl Runner {
         journal: Arc<dyn Journal<Message>>,
         trace: Option<Arc<Trace>>,
     ) -> anyhow::Result<EpisodeResult> {
-        let options = SimOptions {
-            seed,
-            slip_at: config.faults.slip_at,
-            sensor: config.sensor.clone(),
-            motion: !config.no_motion,
-            camera_size: None,
-        };
         let started = now();
-        let simulation = Simulation::new(scenario, &options, self.renderer()?).context("the world cannot be built")?;
-        let world = simulation.world_digest();
+        let world = self.world(scenario, seed, config)?;
         let built_s = started.elapsed().as_secs_f64();
+        let mut result = self.live_in(&world, config, journal, trace)?;
+        result.spent_s.insert("world-building".into(), built_s);
+        result.wall_s += built_s;
+        Ok(result)
+    }
+
+    fn live_in(
+        &self,
+        world: &World<'_>,
+        config: &EpisodeConfig,
+        journal: Arc<dyn Journal<Message>>,
+        trace: Option<Arc<Trace>>,
+    ) -> anyhow::Result<EpisodeResult> {
+        let (started, simulation) = (now(), &world.simulation);
+        let before = simulation.timings();
         let outside =
             Outside { embodiment: simulation.embodiment(), cameras: simulation.camera(), clock: simulation.clock() };
-        let mut lived = self.live(simulation.task(), outside, seed, config, journal, trace)?;
-        split_host_time(&mut lived.spent_s, &simulation.timings());
-        lived.spent_s.insert("world-building".into(), built_s);
+        let mut lived = self.live(simulation.task(), outside, world.seed, config, journal, trace)?;
+        split_host_time(&mut lived.spent_s, &before, &simulation.timings());
         let judged = !matches!(lived.report.ending, Ending::Until { .. });
-        Ok(lived.result(seed, world, judged.then(|| simulation.verdict()), started))
+        Ok(lived.result(world.seed, world.digest.clone(), judged.then(|| simulation.verdict()), started))
     }
 
     /// Runs one episode on a robot in another process. The seed is that of the agent's own draws. A host that is lost
@@ -293,6 +333,22 @@ fn recorded(
     result.and_then(|result| finished.map(|()| result))
 }
 
+/// A scenario's world with one seed. It goes on where the last agent has left it.
+pub struct World<'s> {
+    scenario: &'s Scenario,
+    seed: u64,
+    simulation: Simulation,
+    /// Equal for equal initial worlds.
+    digest: String,
+}
+
+impl World<'_> {
+    /// The simulation: for judging and drawing, never for an agent.
+    pub fn simulation(&self) -> &Simulation {
+        &self.simulation
+    }
+}
+
 /// An episode before it is judged.
 struct Lived {
     report: EpisodeReport,
@@ -336,9 +392,13 @@ pub(crate) fn role(name: &str) -> Option<Role> {
 }
 
 /// The host's time is the world's: physics, rendering and sensor noise are what it consists of.
-fn split_host_time(spent_s: &mut BTreeMap<String, f64>, timings: &SimTimings) {
+fn split_host_time(spent_s: &mut BTreeMap<String, f64>, before: &SimTimings, after: &SimTimings) {
     let host = spent_s.remove("host").unwrap_or(0.0);
-    let parts = [("physics", timings.physics_s), ("render", timings.render_s), ("noise", timings.noise_s)];
+    let parts = [
+        ("physics", after.physics_s - before.physics_s),
+        ("render", after.render_s - before.render_s),
+        ("noise", after.noise_s - before.noise_s),
+    ];
     let known: f64 = parts.iter().map(|(_, seconds)| seconds).sum();
     spent_s.extend(parts.map(|(name, seconds)| (name.to_string(), seconds)));
     spent_s.insert("host-other".into(), (host - known).max(0.0));

@@ -15,6 +15,7 @@
 //! | [`scenario`], [`doctor`] | `acm scenario`, `acm doctor` |
 //! | [`trace`] | `acm trace`: a run written down, and looked into |
 //! | [`video`] | `acm run --video`: an episode as moving pictures |
+//! | [`words`] | words for what memory holds |
 //! | [`statistics`] | proportions with intervals |
 
 pub mod bench;
@@ -32,3 +33,4 @@ pub mod serve;
 pub mod statistics;
 pub mod trace;
 pub mod video;
+pub mod words;

@@ -1,7 +1,8 @@
 //! The story of an episode, told from its messages as they are delivered.
 
+use crate::words;
 use acm_actors::{message::Message, report::Ending};
-use acm_concept::{ids::ObjectId, object::GroundedPart, skill::SkillReport};
+use acm_concept::{ids::ObjectId, object::Blindness, skill::SkillReport};
 use acm_memory::{
     MemoryView,
     entry::{ObjectEntry, Presence},
@@ -18,6 +19,9 @@ use std::{
     sync::{Mutex, PoisonError},
 };
 
+/// A thing that stays for so long has come to rest, seconds.
+const REST_S: f64 = 1.0;
+
 /// Prints what the agent sees, remembers, decides, does and verifies. It only listens: the episode is the same
 /// without it.
 pub struct Narrator {
@@ -26,8 +30,9 @@ pub struct Narrator {
 
 struct Told {
     sink: Box<dyn Write + Send>,
-    /// Where each object was when it was last told of.
-    places: BTreeMap<ObjectId, String>,
+    places: BTreeMap<ObjectId, Whereabouts>,
+    /// Since when nothing can be seen, seconds, and in how many frames.
+    blind: Option<(f64, u32)>,
     /// The end of a skill, until its verdict is known: both are told in one line.
     ended: Option<String>,
     /// Whether nothing is told yet.
@@ -37,6 +42,16 @@ struct Told {
     gave_up: bool,
 }
 
+/// Where an object is, and what of it is told. Of a thing on its way the start, a loss and the end are told.
+struct Whereabouts {
+    category: String,
+    place: String,
+    told: String,
+    /// When it last was elsewhere, seconds.
+    changed_s: f64,
+    moving: bool,
+}
+
 impl Narrator {
     /// A narrator that writes to `sink`.
     pub fn new(sink: Box<dyn Write + Send>) -> Narrator {
@@ -44,6 +59,7 @@ impl Narrator {
             told: Mutex::new(Told {
                 sink,
                 places: BTreeMap::new(),
+                blind: None,
                 ended: None,
                 silent: false,
                 plan: Vec::new(),
@@ -78,18 +94,26 @@ impl Told {
     fn lines(&mut self, message: &Envelope<Message>) -> Vec<String> {
         let at = message.time_ns as f64 * 1e-9;
         match &message.body {
-            Message::Parse { instruction } => vec![format!("told      \"{instruction}\"")],
+            Message::Parse { instruction } => {
+                let mut lines = self.at_rest(f64::INFINITY);
+                lines.push(format!("told      \"{instruction}\""));
+                lines
+            }
             Message::Updated { view, blindness, .. } => {
-                let mut lines: Vec<String> =
-                    blindness.iter().map(|why| format!("saw       nothing: {why:?}")).collect();
-                lines.extend(self.changes(&*view.0));
+                let mut lines: Vec<String> = self.blindness(*blindness, at).into_iter().collect();
+                lines.extend(self.changes(&*view.0, at));
+                lines.extend(self.at_rest(at));
                 lines
             }
             Message::Wipe => {
                 self.places.clear();
                 vec!["fault     memory wiped: objects, places, moves and progress are gone; the task is not".into()]
             }
-            Message::Decided { decision, .. } => self.decision_lines(decision),
+            Message::Decided { decision, .. } => {
+                let mut lines = self.at_rest(f64::INFINITY);
+                lines.extend(self.decision_lines(decision));
+                lines
+            }
             Message::SkillEnded(report) => {
                 self.ended = Some(skill_words(report, at));
                 Vec::new()
@@ -111,25 +135,67 @@ impl Told {
         }
     }
 
+    /// The first frame without sight, and the first one after it.
+    fn blindness(&mut self, why: Option<Blindness>, at_s: f64) -> Option<String> {
+        match (why, &mut self.blind) {
+            (Some(_), Some((_, frames))) => {
+                *frames += 1;
+                None
+            }
+            (Some(why), blind @ None) => {
+                *blind = Some((at_s, 1));
+                Some(format!("saw       nothing: {why:?}"))
+            }
+            (None, blind) => {
+                let (since_s, frames) = blind.take()?;
+                Some(format!("saw       again, after {:.1} s and {frames} frames without sight", at_s - since_s))
+            }
+        }
+    }
+
     /// What changed since it was last told: new things by category, then each thing that is elsewhere.
-    fn changes(&mut self, view: &dyn MemoryView) -> Vec<String> {
+    fn changes(&mut self, view: &dyn MemoryView, at_s: f64) -> Vec<String> {
         let (mut new, mut moved): (BTreeMap<&str, Vec<&ObjectEntry>>, Vec<String>) = Default::default();
         for object in view.objects() {
             let place = place_words(object);
-            match self.places.insert(object.id, place.clone()) {
-                None => new.entry(&object.category).or_default().push(object),
-                Some(before) if before != place => {
-                    moved.push(format!("saw       {} {} now {place}", object.id, object.category))
-                }
-                Some(_) => {}
+            let Some(known) = self.places.get_mut(&object.id) else {
+                let category = object.category.clone();
+                let (told, changed_s, moving) = (place.clone(), f64::NEG_INFINITY, false);
+                self.places.insert(object.id, Whereabouts { category, place, told, changed_s, moving });
+                new.entry(&object.category).or_default().push(object);
+                continue;
+            };
+            if known.place == place {
+                continue;
             }
+            (known.changed_s, known.place) = (at_s, place);
+            let stands = object.presence == Presence::Present;
+            if !(known.moving && stands) {
+                moved.push(format!("saw       {} {} now {}", object.id, object.category, known.place));
+                known.told.clone_from(&known.place);
+            }
+            known.moving = stands;
         }
         let group = |(category, objects): (&&str, &Vec<&ObjectEntry>)| {
             let each: Vec<String> = objects.iter().map(|o| format!("{} {}", o.id, place_words(o))).collect();
-            let size = objects.first().and_then(|o| o.parts.first()).map(size_words).unwrap_or_default();
+            let size = objects.first().map(|object| words::size(object, view.library())).unwrap_or_default();
             format!("saw       {} {category} {size}: {}", objects.len(), each.join(", "))
         };
         new.iter().map(group).chain(moved).collect()
+    }
+
+    /// What has come to rest by now.
+    fn at_rest(&mut self, at_s: f64) -> Vec<String> {
+        let mut lines = Vec::new();
+        for (id, known) in self.places.iter_mut().filter(|(_, known)| known.moving && at_s - known.changed_s >= REST_S)
+        {
+            known.moving = false;
+            if known.told != known.place {
+                lines.push(format!("saw       {id} {} comes to rest at {}", known.category, known.place));
+                known.told.clone_from(&known.place);
+            }
+        }
+        lines
     }
 
     /// A step that was announced as part of a plan is not announced again.
@@ -156,20 +222,13 @@ impl Told {
     }
 }
 
-/// The part's parameters in the order of its template, lengths in centimetres.
-fn size_words(part: &GroundedPart) -> String {
-    let numbers: Vec<String> = part.parameters.iter().map(|p| format!("{:.1}", 100.0 * p.value)).collect();
-    format!("{} cm", numbers.join("x"))
-}
-
 fn place_words(object: &ObjectEntry) -> String {
     match (object.presence, object.pose(), object.support) {
         (Presence::Held, _, _) => "in the hand".into(),
-        (Presence::Missing, _, _) => "is gone from its place".into(),
-        // To the centimetre: noise below that is no news.
+        (Presence::Missing, _, _) => "gone from its place".into(),
         (_, Some(pose), support) => {
             let on = support.map_or(String::new(), |id| format!(" on {id}"));
-            format!("({:.2}, {:.2}){on}", pose.translation.x + 0.0, pose.translation.y + 0.0)
+            format!("{}{on}", words::spot(pose.translation))
         }
         (_, None, _) => "somewhere".into(),
     }
@@ -186,5 +245,37 @@ fn verdict_words(verdict: &Verdict) -> String {
         Outcome::Verified => "VERIFIED".into(),
         Outcome::Contradicted => format!("CONTRADICTED: {}", verdict.reason),
         Outcome::CannotTell => format!("CANNOT TELL: {}", verdict.reason),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_without_sight_are_told_in_two_lines() {
+        let narrator = Narrator::new(Box::new(std::io::sink()));
+        let mut told = narrator.told.lock().unwrap_or_else(PoisonError::into_inner);
+        let frames = [(0.0, None), (0.1, Some(Blindness::NoDepth)), (0.2, Some(Blindness::NoDepth)), (0.5, None)];
+        let lines: Vec<String> = frames.into_iter().filter_map(|(at_s, why)| told.blindness(why, at_s)).collect();
+        let after = "saw       again, after 0.4 s and 2 frames without sight";
+        assert_eq!(lines, ["saw       nothing: NoDepth", after]);
+    }
+
+    #[test]
+    fn what_moves_is_told_when_it_has_come_to_rest() {
+        let narrator = Narrator::new(Box::new(std::io::sink()));
+        let mut told = narrator.told.lock().unwrap_or_else(PoisonError::into_inner);
+        let thing = |place: &str, changed_s| Whereabouts {
+            category: "box".into(),
+            place: place.into(),
+            told: "here".into(),
+            changed_s,
+            moving: true,
+        };
+        told.places.extend([(ObjectId(1), thing("there", 2.0)), (ObjectId(2), thing("here", 2.0))]);
+        assert!(told.at_rest(2.5).is_empty());
+        assert_eq!(told.at_rest(3.0), ["saw       O1 box comes to rest at there"]);
+        assert!(told.at_rest(9.0).is_empty());
     }
 }

@@ -5,21 +5,20 @@
 //!
 //! | module | holds |
 //! |---|---|
+//! | [`scene`] | a frame with what was seen and what is believed drawn over it |
 //! | [`ghost`] | dashed outlines of what is remembered and not seen |
 //! | [`text`] | letters |
 //! | [`film`] | pictures into a GIF that stays small |
 
 pub mod film;
 pub mod ghost;
+pub mod scene;
 pub mod text;
 
 use crate::inject::FrameTap;
 use acm_actors::message::{Message, View};
-use acm_concept::{camera::FrameHeader, ids::ObjectId, object::Percepts, template::TemplateLibrary};
-use acm_memory::{
-    entry::{ObjectEntry, Presence},
-    observation::{Grounding, Outcome, Verdict},
-};
+use acm_concept::{object::Percepts, template::TemplateLibrary};
+use acm_memory::observation::{Grounding, Outcome, Verdict};
 use acm_planner::Decision;
 use acm_runtime::{
     envelope::Envelope,
@@ -28,8 +27,8 @@ use acm_runtime::{
 use anyhow::{Context, bail};
 pub use film::Picture;
 use image::{Rgb, RgbImage, imageops};
+use scene::Scene;
 use std::{
-    collections::BTreeMap,
     fs::File,
     path::{Path, PathBuf},
     sync::{Arc, Mutex, PoisonError},
@@ -37,8 +36,6 @@ use std::{
 
 /// Most pictures of a video; an episode that goes on longer is shown up to here.
 const MAX_PICTURES: usize = 240;
-/// Something remembered at least this far from where a frame showed it is drawn where it is remembered, metres.
-const ELSEWHERE_M: f64 = 0.02;
 /// Height of the strip of text below the image, pixels.
 const STRIP: u32 = 4 * text::LINE;
 /// How long pictures stand, seconds.
@@ -97,13 +94,6 @@ struct Reel {
     steps: usize,
 }
 
-struct Scene {
-    image: RgbImage,
-    header: FrameHeader,
-    /// Where the frame showed each object.
-    seen: BTreeMap<ObjectId, glam::DVec3>,
-}
-
 impl Camera {
     /// A camera that knows the shapes of a library's templates.
     pub fn new(library: Arc<TemplateLibrary>) -> Camera {
@@ -128,13 +118,7 @@ impl Camera {
     /// Draws the last frame with what was seen in it.
     fn scene(&self, percepts: &Percepts, grounding: &Grounding) -> Option<Scene> {
         let frame = self.tap.frames().into_iter().find(|frame| frame.header.id == percepts.frame.id)?;
-        let of = |index: usize| grounding.resolved.iter().find(|r| r.percept == index).map(|r| r.object);
-        let ids: Vec<Option<ObjectId>> = (0..percepts.objects.len()).map(of).collect();
-        let names: Vec<Option<String>> = ids.iter().map(|id| id.map(|id| id.to_string())).collect();
-        let image = acm_perception::overlay::draw(&frame, percepts, &names, &self.library);
-        let places = ids.iter().zip(&percepts.objects);
-        let seen = places.filter_map(|(id, object)| Some(((*id)?, object.pose()?.pose.translation))).collect();
-        Some(Scene { image, header: percepts.frame.clone(), seen })
+        Some(Scene::new(&frame, percepts, grounding, &self.library))
     }
 }
 
@@ -206,7 +190,7 @@ impl Reel {
             return;
         }
         let mut image = match (view, &self.scene, self.pictures.last()) {
-            (Some(view), Some(scene), _) => remembered(scene, view, library),
+            (Some(view), Some(scene), _) => with_strip(&scene.with_beliefs(&*view.0, library)),
             (_, _, Some(last)) => last.image.clone(),
             _ => return,
         };
@@ -218,34 +202,11 @@ impl Reel {
     }
 }
 
-/// The scene with a strip below, and what memory believes that the frame did not show.
-fn remembered(scene: &Scene, view: &View, library: &TemplateLibrary) -> RgbImage {
-    let (width, height) = scene.image.dimensions();
-    let mut image = RgbImage::new(width, height + STRIP);
-    imageops::replace(&mut image, &scene.image, 0, 0);
-    let mut held = 0;
-    for object in view.0.objects() {
-        let Some(pose) = object.pose() else { continue };
-        match object.presence {
-            Presence::Held => {
-                let label = format!("{} {} is in the hand", object.id, object.category);
-                text::write(&mut image, 8, 8 + held * i64::from(text::LINE), &label, YELLOW);
-                held += 1;
-            }
-            Presence::Missing => ghost::draw(&mut image, &scene.header, object, library, &format!("{}?", object.id)),
-            Presence::Present => {
-                let near = |at: &glam::DVec3| at.distance(pose.translation) < ELSEWHERE_M;
-                if !scene.seen.get(&object.id).is_some_and(near) {
-                    ghost::draw(&mut image, &scene.header, object, library, &label(object));
-                }
-            }
-        }
-    }
+/// A picture with room for a strip of text below.
+fn with_strip(picture: &RgbImage) -> RgbImage {
+    let mut image = RgbImage::new(picture.width(), picture.height() + STRIP);
+    imageops::replace(&mut image, picture, 0, 0);
     image
-}
-
-fn label(object: &ObjectEntry) -> String {
-    format!("{} {}", object.id, object.category)
 }
 
 fn verdict_words(verdict: &Verdict) -> (String, Rgb<u8>) {

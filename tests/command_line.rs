@@ -1,6 +1,8 @@
 //! The real binary on bad input: one clear line and exit code 2, nothing lost.
 #![allow(clippy::unwrap_used, clippy::expect_used)] // a failed unwrap is the test's verdict
 
+#[path = "command_line/demo.rs"]
+mod demo;
 #[path = "command_line/perceive.rs"]
 mod perceive;
 #[path = "command_line/real_frames.rs"]
