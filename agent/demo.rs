@@ -88,7 +88,7 @@ impl<'a> Demo<'a> {
         let more = self.more_seeds(told.result.wall_s)?;
         let photograph = perceive::sample::photograph(&self.args.out.join("real.png"))?;
         if let Some(line) = &photograph {
-            say(&headed("7 REAL CAMERA", &format!(" one photograph by a real sensor: {line}")))?;
+            say(&headed("7 REAL CAMERA", &format!(" a real sensor: {line}")))?;
         }
         let facts = Facts {
             scenario: SCENARIO.into(),

@@ -1,7 +1,10 @@
 //! One real photograph for the demo, where the outside data is present.
 
 use super::input;
-use acm_concept::{expectation::Expectation, ids::FrameId, object::GroundedObject, time::Time};
+use acm_concept::{
+    expectation::Expectation, ids::FrameId, object::GroundedObject, template::TemplateLibrary, time::Time,
+};
+use acm_memory::geometry::Body;
 use acm_perception::{Grounder, GrounderConfig, frames, overlay};
 use anyhow::Context;
 use std::{
@@ -27,14 +30,13 @@ pub fn photograph(picture: &Path) -> anyhow::Result<Option<String>> {
         Grounder::new(Arc::clone(&library), GrounderConfig::default()).ground(&frame, &Expectation::default());
     let drawn = overlay::draw(&frame, &percepts, &[], &library);
     drawn.save(picture).with_context(|| format!("the picture {} cannot be written", picture.display()))?;
-    let things: Vec<String> = percepts.objects.iter().map(thing).collect();
-    Ok(Some(format!("{} objects: {} -> {}", things.len(), things.join(", "), picture.display())))
+    let things: Vec<String> = percepts.objects.iter().map(|object| thing(object, &library)).collect();
+    Ok(Some(format!("{} objects: {} cm -> {}", things.len(), things.join(", "), picture.display())))
 }
 
-/// Category and sizes in centimetres.
-fn thing(object: &GroundedObject) -> String {
-    let sizes = object.parts.first().map_or_else(Vec::new, |part| {
-        part.parameters.iter().map(|p| format!("{} {:.1}", p.name, 100.0 * p.value)).collect()
-    });
-    format!("{} ({} cm)", object.category, sizes.join(", "))
+/// Category, largest width and height in centimetres.
+fn thing(object: &GroundedObject, library: &TemplateLibrary) -> String {
+    let Some(body) = Body::of(&object.parts, library) else { return object.category.clone() };
+    let [width, _, height] = body.extents().map(|extent| 100.0 * extent);
+    format!("{} {width:.0}x{height:.0}", object.category)
 }
