@@ -7,7 +7,8 @@
 //! |---|---|
 //! | `scenario`, `model` | scenario files and object models: raw text to checked meaning |
 //! | `random`, `layout` | seeded draws, start layouts, rejection |
-//! | `world`, `body`, `gripper`, `contact` | the running physics: objects, mechanisms, the hand, what it feels |
+//! | `world`, `body`, `contact` | the running physics: objects, mechanisms, what the pads touch |
+//! | `robot` | robots as data: arms, wrists, hands, their limits and what they feel |
 //! | `event`, `slip` | what third parties do, and an injected mishap |
 //! | `oracle`, `state` | the judge and its variables |
 //! | `episode`, `scene`, `report` | the handles, the picture, what is reported |
@@ -22,13 +23,13 @@ mod episode;
 mod event;
 #[cfg(test)]
 mod expert;
-mod gripper;
 mod layout;
 mod model;
 mod oracle;
 mod profile;
 mod random;
 mod report;
+mod robot;
 mod scenario;
 mod scene;
 mod slip;
@@ -41,4 +42,5 @@ pub use oracle::OracleVerdict;
 pub use profile::PhysicsProfile;
 pub use random::DrawError;
 pub use report::{Preview, SimError, SimOptions, SimTimings, TrueObject};
-pub use scenario::{MAX_SCENARIO_BYTES, Scenario, ScenarioError};
+pub use robot::RobotError;
+pub use scenario::{MAX_SCENARIO_BYTES, Scenario, ScenarioError, Setting};

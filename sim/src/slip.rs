@@ -123,6 +123,6 @@ impl Slip {
             let there = solids_at(&other.placed, &other.pose(&world.physics));
             gap(&here, &there).is_ok_and(|gap| gap >= CLEARANCE_M)
         });
-        seen && clear && world.robot.reaches(centre)
+        seen && clear && world.robot.description.reaches(centre)
     }
 }

@@ -1,6 +1,7 @@
 //! What a controller is, how one is started, and why one cannot be.
 
 use crate::{
+    arm::choice::choose,
     functions::{grasp_from_above::GraspFromAbove, place_upright::PlaceUpright, press_down::PressDown},
     hand::Hand,
     run::Run,
@@ -122,7 +123,9 @@ pub fn start(
     robot: &RobotDescription,
     feedback: &Feedback,
 ) -> Result<Box<dyn Controller>, StartError> {
-    let hand = Hand::new(robot, feedback);
+    let arm = choose(invocation, robot, feedback);
+    let (robot, feedback) = (&robot.only(arm), feedback.of_arm(arm).unwrap_or(feedback));
+    let hand = Hand::for_skill(invocation, robot, feedback);
     Ok(match invocation.kind.as_str() {
         "grasp-from-above" => {
             let function = GraspFromAbove::plan(invocation, &hand, feedback)?;

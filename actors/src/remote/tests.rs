@@ -57,6 +57,7 @@ fn description() -> &'static RobotDescription {
         max_turn_rad_s: 2.0,
         tick_s: 0.02,
         home: Pose::IDENTITY,
+        ..RobotDescription::default()
     })
 }
 
@@ -136,6 +137,7 @@ fn toy() -> Host {
         commanded_opening_m: 0.08,
         pad_force_n: [DVec3::ZERO; 2],
         wrist_force_n: DVec3::new(1.0 / 3.0, -0.0, 1e-300),
+        ..Feedback::default()
     };
     let toy = Handle(Arc::new(Mutex::new(Toy { feedback, stopped: false, frames: 0 })));
     let again = toy.clone();
@@ -191,7 +193,7 @@ impl Drop for Served {
 }
 
 fn to(x: f64) -> Command {
-    Command { tcp: Pose::from_translation(DVec3::new(x, 0.1, 0.2)), opening_m: 0.05, grip_force_n: 7.0 }
+    Command::hand(Pose::from_translation(DVec3::new(x, 0.1, 0.2)), 0.05, 7.0)
 }
 
 #[test]

@@ -7,10 +7,10 @@ use super::{
     *,
 };
 use crate::{
-    gripper,
     model::ModelLibrary,
     oracle,
     random::{DrawKind, DrawSpec, StreamKind},
+    robot,
 };
 use acm_concept::{
     camera::{CameraModel, Intrinsics, MAX_PIXELS},
@@ -148,17 +148,14 @@ impl<'a> Meaning<'a> {
         if attempts == 0 || attempts > MAX_ATTEMPTS {
             return Err(self.wrong("random.attempts", format!("{attempts} must lie in 1 to {MAX_ATTEMPTS}")));
         }
-        let workspace = raw.robot.workspace.map_or(gripper::WORKSPACE, |[low, high]| [low.into(), high.into()]);
-        let home = raw.robot.home.map_or(gripper::HOME, DVec3::from);
-        if !(home.cmpge(workspace[0]).all() && home.cmple(workspace[1]).all()) {
-            return Err(self.wrong("robot.home", format!("{home} lies outside of the workspace")));
-        }
+        let workspace = raw.robot.workspace.map(|[low, high]| [low.into(), high.into()]);
+        let robot = robot::open(&raw.robot.model, raw.robot.home.map(DVec3::from), workspace)
+            .map_err(|error| self.wrong("robot", error.to_string()))?;
         Ok(WorldSpec {
             surfaces: raw.surface.iter().map(|s| self.surface(s)).collect::<Result<_, _>>()?,
             lighting: raw.light.as_ref().map_or_else(Lighting::default, lighting),
             cameras: raw.camera.iter().map(|c| self.camera(c)).collect::<Result<_, _>>()?,
-            home,
-            workspace,
+            robot,
             stream: random.map_or(StreamKind::Chacha8, |r| r.stream),
             attempts,
             rejects: random.iter().flat_map(|r| &r.reject).map(|r| self.reject(r, &draws)).collect::<Result<_, _>>()?,

@@ -4,6 +4,7 @@ use super::raw::{Color, RawPerturb};
 use crate::{
     model::ObjectModel,
     random::{DrawSpec, StreamKind},
+    robot::RobotModel,
 };
 use acm_concept::{camera::CameraModel, expression::Expression, task::Budgets};
 use acm_render::Lighting;
@@ -15,8 +16,7 @@ pub(crate) struct WorldSpec {
     pub(crate) surfaces: Vec<SurfaceSpec>,
     pub(crate) lighting: Lighting,
     pub(crate) cameras: Vec<CameraSpec>,
-    pub(crate) home: DVec3,
-    pub(crate) workspace: [DVec3; 2],
+    pub(crate) robot: RobotModel,
     pub(crate) stream: StreamKind,
     pub(crate) attempts: u32,
     pub(crate) draws: Vec<DrawSpec>,

@@ -44,8 +44,7 @@ impl Primitive for Carry {
             Ok(Grip::Unsure) => return Step::Act,
             Ok(Grip::Shifted) => self.path.restart(hand.command.tcp),
         }
-        if let Some(next) = self.path.advance() {
-            hand.command.tcp = next;
+        if hand.follow(&mut self.path) {
             return Step::Act;
         }
         if self.rest.tick(hand, feedback) { Step::Done(Outcome::Arrived) } else { Step::Act }

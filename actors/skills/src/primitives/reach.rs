@@ -43,8 +43,7 @@ impl Primitive for Reach {
             return Step::Failed(failure);
         }
         let commanded = hand.turn_opening(self.opening_m, FINGER_SPEED_M_S);
-        if let Some(next) = self.path.advance() {
-            hand.command.tcp = next;
+        if hand.follow(&mut self.path) {
             return Step::Act;
         }
         let Some(rest) = &mut self.rest else { return Step::Done(Outcome::Arrived) };
