@@ -137,7 +137,7 @@ impl World {
             return Err(EmbodimentError::Stopped);
         }
         self.robot.aim(command).map_err(|reason| EmbodimentError::Refused { reason })?;
-        self.tick().map_or_else(|| Ok(self.feedback()), |reason| Err(EmbodimentError::Failed { reason }))
+        self.tick().map_or_else(|| Ok(self.feedback()), |reason| Err(EmbodimentError::ProtectiveStop { reason }))
     }
 
     /// Advances by one control tick while the robot moves evenly to its aim. Says why it stopped on the way.
@@ -210,7 +210,7 @@ impl World {
         }
         while self.now() < moment {
             if let Some(reason) = self.tick() {
-                return Err(EmbodimentError::Failed { reason });
+                return Err(EmbodimentError::ProtectiveStop { reason });
             }
         }
         Ok(self.now())

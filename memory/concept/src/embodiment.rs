@@ -198,6 +198,12 @@ pub enum EmbodimentError {
     /// A stop was commanded.
     #[error("the robot was stopped")]
     Stopped,
+    /// The arm met something and stopped by itself, part of the way. It takes the next command from where it is.
+    #[error("the arm stopped by itself: {reason}")]
+    ProtectiveStop {
+        /// What it met, with the numbers.
+        reason: String,
+    },
     /// The robot or the link to it failed.
     #[error("the robot failed: {reason}")]
     Failed {

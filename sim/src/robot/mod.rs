@@ -116,7 +116,7 @@ impl Robot {
             limb.forces.add(contacts, index, limb.wrist.force(world));
             if let Some(reason) = limb.links.as_mut().and_then(|links| links.obstructed(world)) {
                 (limb.from, limb.to, limb.at) = (limb.before, limb.before, limb.before);
-                self.stopped.get_or_insert(format!("protective stop: {reason}"));
+                self.stopped.get_or_insert(reason);
             }
         }
     }
@@ -148,14 +148,14 @@ impl Robot {
         self.limbs.get(self.active).map_or(Pose::IDENTITY, |limb| limb.wrist.tcp(world))
     }
 
-    /// The commanded opening of the hand that is told to close most, as a share of the widest. A cup is open when its
-    /// pump is off.
+    /// The commanded opening of the hand that was commanded last, as a share of its widest. A cup is open when its pump is
+    /// off.
     pub(crate) fn commanded_opening(&self) -> f64 {
         let share = |limb: &Limb| match limb.hand {
             Hand::Fingers(_) => limb.grip.opening_m / limb.robot.max_opening_m,
             Hand::Cup(_) => f64::from(u8::from(!limb.grip.vacuum)),
         };
-        self.limbs.iter().map(share).fold(1.0, f64::min)
+        self.limbs.get(self.active).map_or(1.0, share)
     }
 
     /// What touches things on purpose, arm by arm.

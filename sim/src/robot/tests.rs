@@ -101,7 +101,7 @@ const POST: &str = r##"
 [[surface]]
 name = "post"
 size = [0.08, 0.08, 0.45]
-position = [-0.225, -0.232, 0.965]
+position = [-0.225, -0.272, 0.965]
 color = "#808080"
 "##;
 
@@ -113,7 +113,8 @@ fn a_link_that_meets_something_stops_the_arm_and_can_leave_again() {
     world_turn(&mut world, &before);
     let across = before.map(|i| if i == 0 { 0.75 } else { before[i] });
     let error = go(&mut world, 0, across).unwrap_err();
-    assert!(matches!(&error, EmbodimentError::Failed { reason } if reason.contains("protective stop")), "{error}");
+    assert!(matches!(&error, EmbodimentError::ProtectiveStop { .. }), "{error}");
+    assert!(error.to_string().starts_with("the arm stopped by itself: link"), "{error}");
     let stopped = world.feedback();
     assert!(stopped.joints[0] < 0.7, "{:?}", stopped.joints);
     assert!(go(&mut world, 0, before).is_ok(), "after a stop it can be commanded away");
