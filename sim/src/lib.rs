@@ -8,7 +8,8 @@
 //! | `scenario`, `model` | scenario files and object models: raw text to checked meaning |
 //! | `random`, `layout` | seeded draws, start layouts, rejection |
 //! | `world`, `body`, `gripper`, `contact` | the running physics: objects, mechanisms, the hand, what it feels |
-//! | `event`, `slip` | what third parties do, and an injected mishap |
+//! | `event`, `mishap` | what third parties do, and mishaps with what is carried |
+//! | `fluent` | regions, named quantities and the rules that change them |
 //! | `oracle`, `state` | the judge and its variables |
 //! | `episode`, `scene`, `report` | the handles, the picture, what is reported |
 //!
@@ -22,8 +23,10 @@ mod episode;
 mod event;
 #[cfg(test)]
 mod expert;
+mod fluent;
 mod gripper;
 mod layout;
+mod mishap;
 mod model;
 mod oracle;
 mod profile;
@@ -31,12 +34,12 @@ mod random;
 mod report;
 mod scenario;
 mod scene;
-mod slip;
 mod state;
 mod world;
 
 pub use episode::{SharedRenderer, Simulation};
 pub use layout::LayoutError;
+pub use mishap::MishapKind;
 pub use oracle::OracleVerdict;
 pub use profile::PhysicsProfile;
 pub use random::DrawError;
