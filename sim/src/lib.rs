@@ -9,7 +9,8 @@
 //! | `random`, `layout` | seeded draws, start layouts, rejection |
 //! | `world`, `body`, `contact` | the running physics: objects, mechanisms, what the pads touch |
 //! | `robot` | robots as data: arms, wrists, hands, their limits and what they feel |
-//! | `event`, `slip` | what third parties do, and an injected mishap |
+//! | `event`, `mishap` | what third parties do, and mishaps with what is carried |
+//! | `fluent` | regions, named quantities and the rules that change them |
 //! | `oracle`, `state` | the judge and its variables |
 //! | `episode`, `scene`, `report` | the handles, the picture, what is reported |
 //!
@@ -23,7 +24,9 @@ mod episode;
 mod event;
 #[cfg(test)]
 mod expert;
+mod fluent;
 mod layout;
+mod mishap;
 mod model;
 mod oracle;
 mod profile;
@@ -32,12 +35,12 @@ mod report;
 mod robot;
 mod scenario;
 mod scene;
-mod slip;
 mod state;
 mod world;
 
 pub use episode::{SharedRenderer, Simulation};
 pub use layout::LayoutError;
+pub use mishap::MishapKind;
 pub use oracle::OracleVerdict;
 pub use profile::PhysicsProfile;
 pub use random::DrawError;

@@ -57,6 +57,11 @@ impl Watch {
         let values: Vec<(&str, f64)> = self.values(state).collect();
         self.expression.evaluate(&values).is_ok_and(|value| value != 0.0)
     }
+    /// Its value, if it is a finite number.
+    pub(crate) fn value(&self, state: &[f64]) -> Option<f64> {
+        let values: Vec<(&str, f64)> = self.values(state).collect();
+        self.expression.evaluate(&values).ok().filter(|value| value.is_finite())
+    }
     fn values<'a>(&'a self, state: &'a [f64]) -> impl Iterator<Item = (&'a str, f64)> {
         self.slots.iter().map(|(name, slot)| (name.as_str(), state.get(*slot).copied().unwrap_or(f64::NAN)))
     }

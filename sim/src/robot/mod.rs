@@ -26,6 +26,9 @@ use rapier3d::prelude::{ColliderHandle, PhysicsWorld};
 use std::f64::consts::PI;
 use wrist::Wrist;
 
+/// How far the fingers open in a drop, metres.
+const DROP_OPENING_M: f64 = 0.02;
+
 /// A robot in the world.
 #[derive(Debug, Clone)]
 pub(crate) struct Robot {
@@ -105,9 +108,10 @@ impl Robot {
         self.limbs.iter_mut().for_each(|limb| limb.forces = TickForces::default());
     }
 
-    /// Drives everything for one physics step; `fraction` is the share of the tick that is behind after it.
-    pub(crate) fn drive(&mut self, world: &mut PhysicsWorld, fraction: f64) {
-        self.limbs.iter_mut().for_each(|limb| limb.drive(world, fraction));
+    /// Drives everything for one physics step; `fraction` is the share of the tick that is behind after it. With `drops`
+    /// the hands let go, whatever they were told.
+    pub(crate) fn drive(&mut self, world: &mut PhysicsWorld, fraction: f64, drops: bool) {
+        self.limbs.iter_mut().for_each(|limb| limb.drive(world, fraction, drops));
     }
 
     /// Takes what is felt after a physics step. A link that is obstructed stops its arm where it was before.
@@ -203,15 +207,19 @@ impl Limb {
         }
     }
 
-    fn drive(&mut self, world: &mut PhysicsWorld, fraction: f64) {
+    fn drive(&mut self, world: &mut PhysicsWorld, fraction: f64, drops: bool) {
         (self.before, self.at) = (self.at, self.from.towards(&self.to, fraction, &self.robot));
         self.wrist.drive(world, &self.at.tcp);
         if let (Some(links), Some(arm), Some(joints)) = (&self.links, &self.robot.arm, &self.at.joints) {
             links.drive(world, &arm.frames(joints));
         }
         match &mut self.hand {
-            Hand::Fingers(fingers) => fingers.drive(world, &self.wrist, self.grip.opening_m, self.grip.force_n),
-            Hand::Cup(cup) => cup.drive(world, &self.wrist, self.grip.vacuum),
+            Hand::Fingers(fingers) => {
+                let open_m = if drops { fingers.opening(world, &self.wrist) + DROP_OPENING_M } else { 0.0 };
+                let opening_m = self.grip.opening_m.max(open_m).min(self.robot.max_opening_m);
+                fingers.drive(world, &self.wrist, opening_m, self.grip.force_n);
+            }
+            Hand::Cup(cup) => cup.drive(world, &self.wrist, self.grip.vacuum && !drops),
         }
     }
 
