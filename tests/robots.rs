@@ -191,6 +191,12 @@ fn two_pandas_conform() {
 }
 
 #[test]
+fn suction_cups_conform_floating_and_on_an_arm() {
+    conforms("floating-suction");
+    conforms("panda-suction");
+}
+
+#[test]
 fn every_robot_stops_and_refuses_to_move_when_it_must() {
     for robot in ["floating-gripper", "floating-suction", "panda", "panda-suction", "dual-panda"] {
         let mut trial = Trial::new(robot, 0, false);

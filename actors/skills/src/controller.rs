@@ -2,7 +2,10 @@
 
 use crate::{
     arm::choice::choose,
-    functions::{grasp_from_above::GraspFromAbove, place_upright::PlaceUpright, press_down::PressDown},
+    functions::{
+        grasp_from_above::GraspFromAbove, place_upright::PlaceUpright, press_down::PressDown,
+        suck_from_above::SuckFromAbove,
+    },
     hand::Hand,
     run::Run,
 };
@@ -124,9 +127,14 @@ pub fn start(
     feedback: &Feedback,
 ) -> Result<Box<dyn Controller>, StartError> {
     let arm = choose(invocation, robot, feedback);
-    let (robot, feedback) = (&robot.only(arm), feedback.of_arm(arm).unwrap_or(feedback));
-    let hand = Hand::for_skill(invocation, robot, feedback);
+    let hand = Hand::for_skill(invocation, robot, feedback, arm);
+    let feedback = feedback.of_arm(arm).unwrap_or(feedback);
     Ok(match invocation.kind.as_str() {
+        // What a hand does to take a part from above depends on the hand.
+        "grasp-from-above" if hand.robot.suction.is_some() => {
+            let function = SuckFromAbove::plan(invocation, &hand, feedback)?;
+            Box::new(Run::new(invocation, hand, function))
+        }
         "grasp-from-above" => {
             let function = GraspFromAbove::plan(invocation, &hand, feedback)?;
             Box::new(Run::new(invocation, hand, function))

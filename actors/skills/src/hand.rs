@@ -44,14 +44,17 @@ pub(crate) struct Hand {
 }
 
 impl Hand {
-    /// Begins where the hand is and takes the force it feels now as its baseline. The robot has one arm or none, and the
-    /// feedback is that arm's.
+    /// The hand of the arm that was commanded last. Begins where it is and takes the force it feels now as its baseline.
     pub fn new(robot: &RobotDescription, feedback: &Feedback) -> Hand {
-        Hand::among(robot, feedback, &[], &[])
+        let arm = feedback.arm;
+        Hand::among(&robot.only(arm), feedback, &[], &other_arms(robot, feedback, arm))
     }
-    /// As [`Hand::new`], for a skill: an arm keeps clear of all that the invocation knows, with what is held in the hand.
-    pub fn for_skill(invocation: &SkillInvocation, robot: &RobotDescription, feedback: &Feedback) -> Hand {
-        let obstacles: Vec<PlacedSolid> = invocation.obstacles.iter().map(|(_, solid)| *solid).collect();
+    /// The hand of one arm, for a skill: the arm keeps clear of all that the invocation knows, with what is held in the
+    /// hand, and of the robot's other arms.
+    pub fn for_skill(invocation: &SkillInvocation, robot: &RobotDescription, feedback: &Feedback, arm: usize) -> Hand {
+        let mut obstacles = other_arms(robot, feedback, arm);
+        obstacles.extend(invocation.obstacles.iter().map(|(_, solid)| *solid));
+        let (robot, feedback) = (&robot.only(arm), feedback.of_arm(arm).unwrap_or(feedback));
         let in_tcp = invocation.held.as_ref().map_or(Pose::IDENTITY, |(_, base, _)| *base);
         let place = |part: &PlacedSolid| PlacedSolid { solid: part.solid, pose: in_tcp * part.pose };
         let held: Vec<PlacedSolid> = invocation.held_solids.iter().map(place).collect();
@@ -176,6 +179,17 @@ impl Hand {
     pub fn tip_height_m(&self, tcp: &Pose) -> f64 {
         tcp.translation.z - self.tip_reach_m
     }
+}
+
+/// What the arms but one fill in the world.
+fn other_arms(robot: &RobotDescription, feedback: &Feedback, arm: usize) -> Vec<PlacedSolid> {
+    let mut solids = Vec::new();
+    for other in (0..robot.arms()).filter(|other| *other != arm) {
+        let (Some(robot), Some(felt)) = (robot.of_arm(other), feedback.of_arm(other)) else { continue };
+        solids.extend(robot.solids(&felt.tcp, felt.opening_m));
+        solids.extend(robot.arm.iter().flat_map(|links| links.solids(&felt.joints)));
+    }
+    solids
 }
 
 /// Whether each pad has something on it.

@@ -177,9 +177,9 @@ impl Path {
     pub fn end(&self) -> Pose {
         self.end
     }
-    /// How long the whole path takes, seconds.
-    pub fn duration_s(&self) -> f64 {
-        self.duration_s
+    /// How long the whole path takes at most, seconds: an arm may find another way to its end, which is longer.
+    pub fn longest_s(&self) -> f64 {
+        if self.travels { 3.0 * self.duration_s + 4.0 } else { self.duration_s }
     }
 }
 

@@ -60,8 +60,8 @@ pub enum RetreatTick {
 /// }
 /// ```
 pub fn retreat(robot: &RobotDescription, feedback: &Feedback) -> Retreat {
-    let robot = &robot.only(feedback.arm);
     let hand = Hand::new(robot, feedback);
+    let robot = &robot.only(feedback.arm);
     let holding = holds_something(feedback);
     let pace = if holding { Pace::carrying(robot) } else { Pace::free(robot) };
     let heading = robot.home.yaw();

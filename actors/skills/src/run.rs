@@ -159,6 +159,7 @@ impl<F: Function> Run<F> {
     fn fail(&mut self, feedback: &Feedback, failure: Failure) -> Tick {
         self.close_primitive(feedback, Some(failure.reason.clone()));
         if failure.empty_handed {
+            self.hand.command.vacuum = false;
             self.notes.feel_empty(self.function.object());
         }
         self.failure = Some((failure.cause, failure.reason));

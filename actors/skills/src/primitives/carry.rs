@@ -34,7 +34,7 @@ impl Primitive for Carry {
         Kind::Move
     }
     fn limit_s(&self) -> f64 {
-        self.path.duration_s() + SLACK_S
+        self.path.longest_s() + SLACK_S
     }
     fn tick(&mut self, hand: &mut Hand, feedback: &Feedback) -> Step {
         let grip = self.watch.check(hand, feedback);

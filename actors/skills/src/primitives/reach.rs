@@ -36,7 +36,7 @@ impl Primitive for Reach {
         Kind::Reach
     }
     fn limit_s(&self) -> f64 {
-        self.path.duration_s() + SLACK_S
+        self.path.longest_s() + SLACK_S
     }
     fn tick(&mut self, hand: &mut Hand, feedback: &Feedback) -> Step {
         if let Err(failure) = check_collision(hand, "while reaching") {
