@@ -46,7 +46,10 @@ impl Trial {
         let base = self.object(object).pose;
         let others = self.simulation.truth().into_iter().enumerate().map(|(index, other)| {
             let centre = Pose::from_translation(DVec3::Z * 0.5 * other.size_m.z);
-            (ObjectId(10 + index as u64), PlacedSolid { solid: Solid::Box { size: other.size_m }, pose: other.pose * centre })
+            (
+                ObjectId(10 + index as u64),
+                PlacedSolid { solid: Solid::Box { size: other.size_m }, pose: other.pose * centre },
+            )
         });
         let own = self.simulation.truth().iter().position(|other| other.name == object).unwrap();
         SkillInvocation {
@@ -70,10 +73,10 @@ impl Trial {
         self.run(&self.invocation("grasp-from-above", "cube", 0.5 * CUBE_M, &arguments))
     }
     fn place(&mut self, held: (ObjectId, Pose), to: Pose) -> SkillReport {
-        let mut invocation = self.invocation("place-upright", "cube", 0.0, &[("grip_width", CUBE_M), ("height", CUBE_M)]);
+        let mut invocation =
+            self.invocation("place-upright", "cube", 0.0, &[("grip_width", CUBE_M), ("height", CUBE_M)]);
         let solid = Solid::Box { size: DVec3::splat(CUBE_M) };
-        invocation.held_solids =
-            vec![PlacedSolid { solid, pose: Pose::from_translation(DVec3::Z * 0.5 * CUBE_M) }];
+        invocation.held_solids = vec![PlacedSolid { solid, pose: Pose::from_translation(DVec3::Z * 0.5 * CUBE_M) }];
         invocation.obstacles.retain(|(id, _)| *id != held.0);
         invocation.destination = Some(Place { support: None, pose: to, tolerance_m: 0.02 });
         invocation.held = Some((held.0, held.1, part(to)));
@@ -201,9 +204,12 @@ fn every_robot_stops_and_refuses_to_move_when_it_must() {
     for robot in ["floating-gripper", "floating-suction", "panda", "panda-suction", "dual-panda"] {
         let mut trial = Trial::new(robot, 0, false);
         let here = trial.robot.feedback();
-        let mut controller =
-            start(&trial.invocation("press-down", "button", 0.03, &[("stroke", 0.008), ("force", 12.0)]),
-                trial.robot.description(), &here).unwrap();
+        let mut controller = start(
+            &trial.invocation("press-down", "button", 0.03, &[("stroke", 0.008), ("force", 12.0)]),
+            trial.robot.description(),
+            &here,
+        )
+        .unwrap();
         let Tick::Act(command) = controller.tick(&here) else { panic!("{robot}: no command") };
         assert_eq!(trial.robot.command(&command), Err(EmbodimentError::MotionDisabled), "{robot}");
 

@@ -46,8 +46,12 @@ pub(crate) struct Hand {
 impl Hand {
     /// The hand of the arm that was commanded last. Begins where it is and takes the force it feels now as its baseline.
     pub fn new(robot: &RobotDescription, feedback: &Feedback) -> Hand {
-        let arm = feedback.arm;
-        Hand::among(&robot.only(arm), feedback, &[], &other_arms(robot, feedback, arm))
+        Hand::of_arm(robot, feedback, feedback.arm)
+    }
+    /// The hand of one arm, which keeps clear of the others.
+    pub fn of_arm(robot: &RobotDescription, feedback: &Feedback, arm: usize) -> Hand {
+        let own = feedback.of_arm(arm).unwrap_or(feedback);
+        Hand::among(&robot.only(arm), own, &[], &other_arms(robot, feedback, arm))
     }
     /// The hand of one arm, for a skill: the arm keeps clear of all that the invocation knows, with what is held in the
     /// hand, and of the robot's other arms.

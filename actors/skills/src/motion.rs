@@ -130,7 +130,8 @@ impl Path {
         let height_m = height_m.max(goal.translation.z);
         let up = from.translation.with_z(from.translation.z.max(height_m));
         let across = goal.translation.with_z(height_m);
-        let path = Path::through(from, &[Pose::new(up, from.rotation), Pose::new(across, goal.rotation), goal], pace, tick_s);
+        let path =
+            Path::through(from, &[Pose::new(up, from.rotation), Pose::new(across, goal.rotation), goal], pace, tick_s);
         Path { travels: true, ..path }
     }
     /// Straight up or down to a height.

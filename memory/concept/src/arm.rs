@@ -173,9 +173,8 @@ impl ArmDescription {
         }
         self.joints.iter().zip(joints).find_map(|(joint, &at)| {
             let inside = at >= joint.min_rad - tolerance_rad && at <= joint.max_rad + tolerance_rad;
-            (!inside).then(|| {
-                format!("{} at {at:.4} rad is not in {} to {} rad", joint.name, joint.min_rad, joint.max_rad)
-            })
+            (!inside)
+                .then(|| format!("{} at {at:.4} rad is not in {} to {} rad", joint.name, joint.min_rad, joint.max_rad))
         })
     }
     /// Two parts of the arm that are nearer to each other than `margin_m`, in a sentence. Links that are next to each

@@ -65,11 +65,7 @@ fn names() -> Vec<String> {
 }
 
 /// The robot of a name. A scenario may have another place to wait for a hand that floats, and another workspace.
-pub(crate) fn open(
-    name: &str,
-    home: Option<DVec3>,
-    workspace: Option<[DVec3; 2]>,
-) -> Result<RobotModel, RobotError> {
+pub(crate) fn open(name: &str, home: Option<DVec3>, workspace: Option<[DVec3; 2]>) -> Result<RobotModel, RobotError> {
     let file = format!("{name}.toml");
     let Some(text) = EMBEDDED.get_file(&file).and_then(|file| file.contents_utf8()) else {
         let known = names();
@@ -222,7 +218,8 @@ fn build(
     let mount = add_hand(&hand_file, &hand, &mut bare)?;
     let mut arms = Vec::new();
     if raw.arm.is_empty() {
-        let at = home.or(raw.home.map(DVec3::from)).ok_or_else(|| wrong(file, "home", "a hand without an arm needs it"))?;
+        let at =
+            home.or(raw.home.map(DVec3::from)).ok_or_else(|| wrong(file, "home", "a hand without an arm needs it"))?;
         bare.home = Pose::new(at, DQuat::from_rotation_x(PI));
         arms.push(bare);
     } else if raw.arm.len() > MAX_ARMS {
@@ -254,12 +251,11 @@ fn add_hand(file: &str, hand: &RawHand, robot: &mut RobotDescription) -> Result<
     let placed = |solid, z: f64, y: f64| PlacedSolid { solid, pose: Pose::from_translation(DVec3::new(0.0, y, z)) };
     match hand {
         RawHand::TwoFinger { flange_to_tcp_m, hand_m, finger_m, tip_m, max_opening_m, max_grip_force_n, capsule } => {
-            positive(file, "flange_to_tcp_m, tip_m, max_opening_m, max_grip_force_n", &[
-                *flange_to_tcp_m,
-                *tip_m,
-                *max_opening_m,
-                *max_grip_force_n,
-            ])?;
+            positive(
+                file,
+                "flange_to_tcp_m, tip_m, max_opening_m, max_grip_force_n",
+                &[*flange_to_tcp_m, *tip_m, *max_opening_m, *max_grip_force_n],
+            )?;
             positive(file, "hand_m", hand_m)?;
             positive(file, "finger_m", finger_m)?;
             let (palm, finger) = (DVec3::from(*hand_m), DVec3::from(*finger_m));
@@ -281,13 +277,11 @@ fn add_hand(file: &str, hand: &RawHand, robot: &mut RobotDescription) -> Result<
             venting_s,
             capsule,
         } => {
-            positive(file, "flange_to_tcp_m, max_force_n, max_tilt_deg, evacuation_s, venting_s", &[
-                *flange_to_tcp_m,
-                *max_force_n,
-                *max_tilt_deg,
-                *evacuation_s,
-                *venting_s,
-            ])?;
+            positive(
+                file,
+                "flange_to_tcp_m, max_force_n, max_tilt_deg, evacuation_s, venting_s",
+                &[*flange_to_tcp_m, *max_force_n, *max_tilt_deg, *evacuation_s, *venting_s],
+            )?;
             positive(file, "stem_m, cup_m", &[stem_m.radius, stem_m.length, cup_m.radius, cup_m.length])?;
             let rod = |rod: &RawRod, end: f64| {
                 placed(Solid::Cylinder { radius: rod.radius, height: rod.length }, end - 0.5 * rod.length, 0.0)
@@ -308,7 +302,11 @@ fn add_hand(file: &str, hand: &RawHand, robot: &mut RobotDescription) -> Result<
 fn mounted(file: &str, raw: &RawArm, mount: &Mount) -> Result<ArmDescription, RobotError> {
     let (chain_file, chain) = part::<RawChain>(file, "arm.chain", &raw.chain)?;
     if chain.joint.is_empty() || chain.joint.len() > MAX_JOINTS {
-        return Err(wrong(&chain_file, "joint", format!("{} joints, 1 to {MAX_JOINTS} are possible", chain.joint.len())));
+        return Err(wrong(
+            &chain_file,
+            "joint",
+            format!("{} joints, 1 to {MAX_JOINTS} are possible", chain.joint.len()),
+        ));
     }
     let joints = chain.joint.iter().map(|joint| self::joint(&chain_file, joint)).collect::<Result<Vec<_>, _>>()?;
     let flange = frame(&chain.flange.translation, &chain.flange.rpy_deg);

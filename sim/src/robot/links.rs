@@ -60,7 +60,12 @@ impl Links {
             // Tables and walls too: what cannot give way is not pushed, but the contact is found.
             let types = ActiveCollisionTypes::default() | ActiveCollisionTypes::KINEMATIC_FIXED;
             let collider = shape.density(0.0).collision_groups(groups).active_collision_types(types);
-            Part { link: capsule.link, body, collider: world.insert_collider(collider, Some(body)), last: Press::default() }
+            Part {
+                link: capsule.link,
+                body,
+                collider: world.insert_collider(collider, Some(body)),
+                last: Press::default(),
+            }
         });
         Links { parts: parts.collect() }
     }

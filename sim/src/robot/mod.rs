@@ -92,7 +92,8 @@ impl Robot {
         let others: Vec<&Limb> =
             self.limbs.iter().enumerate().filter(|(arm, _)| *arm != command.arm).map(|(_, limb)| limb).collect();
         let limb = self.limbs.get(command.arm);
-        let limb = limb.ok_or_else(|| format!("there is no arm {}, the robot has {}", command.arm, self.limbs.len()))?;
+        let limb =
+            limb.ok_or_else(|| format!("there is no arm {}, the robot has {}", command.arm, self.limbs.len()))?;
         let aim = limits::aim(limb, &others, command)?;
         if let Some(limb) = self.limbs.get_mut(command.arm) {
             let (opening_m, force_n) = (command.opening_m, command.grip_force_n);

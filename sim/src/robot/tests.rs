@@ -144,7 +144,8 @@ fn one_arm_moves_and_the_other_holds_still() {
 #[test]
 fn arms_that_would_touch_each_other_or_themselves_are_refused() {
     let mut both = world("dual-panda");
-    let across = |world: &World, arm: usize, turn: f64| home(world, arm).map(|i| [turn, 0.5, 0.0, -1.9, 0.0, 2.4, 0.785][i]);
+    let across =
+        |world: &World, arm: usize, turn: f64| home(world, arm).map(|i| [turn, 0.5, 0.0, -1.9, 0.0, 2.4, 0.785][i]);
     // Each reaches over to the other's side.
     let (left, right) = (across(&both, 0, -0.5), across(&both, 1, 0.5));
     go(&mut both, 0, left).unwrap();
@@ -188,7 +189,11 @@ fn a_cup_holds_what_it_is_pressed_on_and_lets_it_go() {
     let free = go(&mut world, start.translation.with_z(top + 0.001), false);
     assert_eq!(free.vacuum, 0.0);
     go(&mut world, over, false);
-    assert!(!cube(&world).held && cube(&world).pose.translation.distance(start.translation) < 0.005, "{:?}", cube(&world));
+    assert!(
+        !cube(&world).held && cube(&world).pose.translation.distance(start.translation) < 0.005,
+        "{:?}",
+        cube(&world)
+    );
 }
 
 #[test]

@@ -33,7 +33,8 @@ impl FromStr for Setting {
         if path.len() > MAX_DEPTH || path.iter().any(String::is_empty) {
             return Err(usage());
         }
-        let parsed = toml::from_str::<Table>(&format!("value = {value}")).ok().and_then(|mut table| table.remove("value"));
+        let parsed =
+            toml::from_str::<Table>(&format!("value = {value}")).ok().and_then(|mut table| table.remove("value"));
         Ok(Setting { path, value: parsed.unwrap_or_else(|| Value::String(value.into())) })
     }
 }
@@ -43,7 +44,8 @@ pub(super) fn apply(file: &str, text: &str, settings: &[Setting]) -> Result<Stri
     let wrong = |reason: String| ScenarioError::Format { file: file.into(), reason };
     let mut root = Value::Table(toml::from_str::<Table>(text).map_err(|error| wrong(error.to_string()))?);
     for setting in settings {
-        put(&mut root, setting).map_err(|reason| wrong(format!("{} cannot be set: {reason}", setting.path.join("."))))?;
+        put(&mut root, setting)
+            .map_err(|reason| wrong(format!("{} cannot be set: {reason}", setting.path.join("."))))?;
     }
     toml::to_string(&root).map_err(|error| wrong(error.to_string()))
 }

@@ -157,14 +157,21 @@ impl Drive {
             thought.follow(&tcp)?;
             ticks += 1;
             let checked = ticks % CHECK_EVERY == 0;
-            if let Some(margin_m) = margin_m.filter(|margin_m| checked && !self.scene.is_clear(&thought.joints, *margin_m)) {
+            if let Some(margin_m) =
+                margin_m.filter(|margin_m| checked && !self.scene.is_clear(&thought.joints, *margin_m))
+            {
                 return Err(format!("{}: less than {:.0} mm from something", at(&tcp), 1e3 * margin_m));
             }
         }
         let (_, end) = thought.hold();
         let short_m = end.translation.distance(path.end().translation);
         if short_m > LAG_M {
-            return Err(format!("{}: the arm ends {:.1} mm short, {}", at(&path.end()), 1e3 * short_m, thought.why_short()));
+            return Err(format!(
+                "{}: the arm ends {:.1} mm short, {}",
+                at(&path.end()),
+                1e3 * short_m,
+                thought.why_short()
+            ));
         }
         Ok(())
     }
@@ -243,10 +250,13 @@ impl Drive {
     /// What keeps the arm from getting farther.
     fn why_short(&self) -> String {
         let arm: &ArmDescription = self.scene.arm();
-        let at_limit = arm.joints.iter().zip(self.joints.iter()).find(|(joint, at)| {
-            (**at - joint.min_rad).min(joint.max_rad - **at) < 0.01
-        });
-        at_limit.map_or_else(|| "stretched out or too fast".into(), |(joint, _)| format!("{} is at its limit", joint.name))
+        let at_limit = arm
+            .joints
+            .iter()
+            .zip(self.joints.iter())
+            .find(|(joint, at)| (**at - joint.min_rad).min(joint.max_rad - **at) < 0.01);
+        at_limit
+            .map_or_else(|| "stretched out or too fast".into(), |(joint, _)| format!("{} is at its limit", joint.name))
     }
 }
 

@@ -44,9 +44,11 @@ fn twist(shift: DVec3, turn: DVec3) -> SVector<f64, 6> {
     SVector::from([shift.x, shift.y, shift.z, turn.x, turn.y, turn.z])
 }
 
-/// What is left to a goal: shift and turn.
+/// What is left to a goal: shift and turn, the shorter way round.
 fn error(tcp: &Pose, goal: &Pose) -> (DVec3, DVec3) {
-    (goal.translation - tcp.translation, (goal.rotation * tcp.rotation.inverse()).to_scaled_axis())
+    let turn = goal.rotation * tcp.rotation.inverse();
+    let turn = if turn.w < 0.0 { -turn } else { turn };
+    (goal.translation - tcp.translation, turn.to_scaled_axis())
 }
 
 /// How near `joints` put the TCP to a goal, as a share of what counts as exact: at most 1 is exact.
@@ -126,14 +128,15 @@ pub(crate) fn random(arm: &ArmDescription, rng: &mut ChaCha8Rng) -> Joints {
 
 /// The smallest distance of a joint to one of its limits, radians.
 pub(crate) fn margin_rad(arm: &ArmDescription, joints: &Joints) -> f64 {
-    let margin = |(joint, at): (&acm_concept::arm::JointDescription, &f64)| (at - joint.min_rad).min(joint.max_rad - at);
+    let margin =
+        |(joint, at): (&acm_concept::arm::JointDescription, &f64)| (at - joint.min_rad).min(joint.max_rad - at);
     arm.joints.iter().zip(joints.iter()).map(margin).fold(f64::INFINITY, f64::min)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::arm::scene::tests::panda;
+    use crate::{arm::scene::tests::panda, geometry::downward};
 
     #[test]
     fn the_jacobian_is_the_derivative_of_the_forward_kinematics() {
@@ -161,6 +164,21 @@ mod tests {
         }
         println!("{solved} of {goals} goals solved, {at_once} without a restart");
         assert!(solved >= goals * 995 / 1000, "{solved} of {goals}");
+    }
+
+    /// A hand over the table can be turned to any heading, or to the one that looks the same.
+    #[test]
+    fn every_heading_over_the_table_is_found() {
+        let arm = panda();
+        for step in 0..24 {
+            let heading = f64::from(step) * 15f64.to_radians();
+            let found = |heading| {
+                !solutions(&arm, &downward(DVec3::new(0.44, -0.2, 0.07), heading), &arm.home, 1, 8).is_empty()
+            };
+            assert!(found(heading) || found(heading + std::f64::consts::PI), "{heading}");
+            // Well inside the last joint's range both ways round the quaternion must do.
+            assert!(found(heading) || !(-1.5..1.5).contains(&acm_concept::pose::wrap_angle(heading)), "{heading}");
+        }
     }
 
     #[test]

@@ -168,12 +168,8 @@ pub(crate) mod tests {
             max_acceleration_rad_s2: 10.0,
             max_torque_nm: 50.0,
         };
-        let along = |link, from: f64, to: f64| LinkCapsule {
-            link,
-            from: DVec3::Z * from,
-            to: DVec3::Z * to,
-            radius_m: 0.06,
-        };
+        let along =
+            |link, from: f64, to: f64| LinkCapsule { link, from: DVec3::Z * from, to: DVec3::Z * to, radius_m: 0.06 };
         ArmDescription {
             base: Pose::IDENTITY,
             joints: rows.iter().enumerate().map(joint).collect(),

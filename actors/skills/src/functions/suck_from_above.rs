@@ -57,7 +57,8 @@ impl SuckFromAbove {
         let (base, frame) = (invocation.target.pose.pose, invocation.frame);
         let top_m = (base.translation.z + height_m).max(frame.translation.z);
         let turn = 2.4 * f64::from(invocation.attempt);
-        let aside = if invocation.attempt == 0 { DVec3::ZERO } else { ASIDE_M * DVec3::new(turn.cos(), turn.sin(), 0.0) };
+        let aside =
+            if invocation.attempt == 0 { DVec3::ZERO } else { ASIDE_M * DVec3::new(turn.cos(), turn.sin(), 0.0) };
         let at = frame.translation.with_z(top_m) + aside;
         within_guarded_reach(&hand.robot, "the face", at)?;
         within_reach(&hand.robot, "the pose above the face", at + GUARD_M * DVec3::Z)?;

@@ -68,7 +68,10 @@ impl Primitive for Suck {
         self.pressed_ticks += 1;
         if self.pressed_ticks > hand.ticks(SEALING_S) {
             let share = 100.0 * feedback.vacuum;
-            return Suck::fail(hand, format!("the cup is pressed on, but the face does not close it: {share:.0} % of the vacuum"));
+            return Suck::fail(
+                hand,
+                format!("the cup is pressed on, but the face does not close it: {share:.0} % of the vacuum"),
+            );
         }
         Step::Act
     }

@@ -86,9 +86,9 @@ fn arm(arm: &ArmDescription) -> Result<(), String> {
             return Err(format!("the frame, axis or limits of its joint `{}` are not possible", joint.name));
         }
     }
-    let finite = arm.parts().all(|part| {
-        part.link <= joints && part.from.is_finite() && part.to.is_finite() && part.radius_m.is_finite()
-    });
+    let finite = arm
+        .parts()
+        .all(|part| part.link <= joints && part.from.is_finite() && part.to.is_finite() && part.radius_m.is_finite());
     match arm.limit_broken(&arm.home, 1e-6) {
         Some(reason) => Err(format!("an arm's home is beyond its limits: {reason}")),
         None if finite && arm.base.is_valid() && arm.tool.is_valid() => Ok(()),

@@ -90,7 +90,8 @@ fn the_panda_is_the_one_its_maker_describes() {
         (seed >> 11) as f64 / (1u64 << 53) as f64
     };
     for _ in 0..200 {
-        let joints = arm.home.map(|i| arm.joints[i].min_rad + random() * (arm.joints[i].max_rad - arm.joints[i].min_rad));
+        let joints =
+            arm.home.map(|i| arm.joints[i].min_rad + random() * (arm.joints[i].max_rad - arm.joints[i].min_rad));
         let mut at = Pose::IDENTITY;
         for (index, turn) in joints.iter().enumerate() {
             at = at * pose(joint(&format!("panda_joint{}", index + 1))) * Pose::from_yaw(DVec3::ZERO, *turn);
