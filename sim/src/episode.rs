@@ -3,9 +3,10 @@
 use crate::{
     body::Body,
     oracle::OracleVerdict,
-    report::{Preview, SimError, SimOptions, SimTimings, TrueObject},
+    report::{Preview, SimError, SimOptions, SimTimings},
     scenario::{Scenario, TaskTemplate},
     scene::{Ids, Stage, fnv, state_hash},
+    truth::TrueObject,
     world::{World, cpu_s},
 };
 use acm_concept::{
@@ -140,8 +141,11 @@ impl Simulation {
         let rounded = |v: glam::DVec3| (v * 1e4).round().as_i64vec3();
         let line = |body: &Body| {
             let yaw = (body.start.yaw() * 1e2).round() as i64;
-            let color = body.placed.solids.first().map(|solid| solid.color);
-            format!("{} {yaw} {} {color:?}", rounded(body.start.translation), rounded(body.placed.size()))
+            let color = body.placed.color();
+            let joints: Vec<i64> =
+                body.joints.iter().map(|(_, joint)| (joint.joint.start * 1e3).round() as i64).collect();
+            let (at, size) = (rounded(body.start.translation), rounded(body.placed.size()));
+            format!("{at} {yaw} {size} {color:?} {joints:?}")
         };
         let mut lines: Vec<String> = world.bodies.iter().map(line).collect();
         lines.sort();

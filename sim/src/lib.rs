@@ -6,16 +6,17 @@
 //! | module | holds |
 //! |---|---|
 //! | `scenario`, `model` | scenario files and object models: raw text to checked meaning |
-//! | `random`, `layout` | seeded draws, start layouts, rejection |
-//! | `world`, `body`, `gripper`, `contact` | the running physics: objects, mechanisms, the hand, what it feels |
+//! | `random`, `layout`, `placed` | seeded draws, start layouts, rejection, how one copy is made |
+//! | `world`, `body`, `articulation`, `gripper`, `contact` | the running physics: objects, their joints, the hand, what it feels |
 //! | `event`, `mishap` | what third parties do, and mishaps with what is carried |
 //! | `fluent` | regions, named quantities and the rules that change them |
 //! | `oracle`, `state` | the judge and its variables |
-//! | `episode`, `scene`, `report` | the handles, the picture, what is reported |
+//! | `episode`, `scene`, `truth`, `report` | the handles, the picture, the truth, what is reported |
 //!
 //! Conventions: metres, seconds, newtons; world frame with z up; an object's base frame is the middle of its bottom.
 //! The world advances only when the robot is commanded or the clock waits.
 
+mod articulation;
 mod body;
 mod contact;
 mod convert;
@@ -29,12 +30,14 @@ mod layout;
 mod mishap;
 mod model;
 mod oracle;
+mod placed;
 mod profile;
 mod random;
 mod report;
 mod scenario;
 mod scene;
 mod state;
+mod truth;
 mod world;
 
 pub use episode::{SharedRenderer, Simulation};
@@ -43,5 +46,6 @@ pub use mishap::MishapKind;
 pub use oracle::OracleVerdict;
 pub use profile::PhysicsProfile;
 pub use random::DrawError;
-pub use report::{Preview, SimError, SimOptions, SimTimings, TrueObject};
+pub use report::{Preview, SimError, SimOptions, SimTimings};
 pub use scenario::{MAX_SCENARIO_BYTES, Scenario, ScenarioError};
+pub use truth::{TrueJoint, TrueLink, TrueObject, TruePiece, TrueShape};
