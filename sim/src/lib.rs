@@ -33,8 +33,12 @@ mod random;
 mod report;
 mod scenario;
 mod scene;
+#[cfg(test)]
+mod shared_data;
 mod slip;
 mod state;
+#[cfg(test)]
+mod testbed;
 mod truth;
 mod world;
 
