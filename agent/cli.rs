@@ -162,7 +162,7 @@ pub struct RunArgs {
     /// Template files instead of the built-in library.
     #[arg(long, value_name = "DIR")]
     pub library: Option<PathBuf>,
-    /// A fault: black-frames, freeze-frames, wipe-memory@EVENT, slip@N. May be given more than once.
+    /// A fault: black-frames, freeze-frames, wipe-memory@EVENT, slip@N, drop@N. May be given more than once.
     #[arg(long, value_name = "FAULT")]
     pub inject: Vec<Injection>,
     /// Refuse every motion, as on a robot that must not move.
@@ -297,7 +297,7 @@ pub struct ServeArgs {
     /// How frames go to the agent: auto, shared-memory, inline.
     #[arg(long, value_name = "WAY", default_value = "auto")]
     pub frames: FrameMode,
-    /// A fault of the world: slip@N.
+    /// A fault of the world: slip@N or drop@N.
     #[arg(long, value_name = "FAULT")]
     pub inject: Vec<Injection>,
     /// Refuse every motion.

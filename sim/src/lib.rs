@@ -8,7 +8,8 @@
 //! | `scenario`, `model` | scenario files and object models: raw text to checked meaning |
 //! | `random`, `layout`, `placed` | seeded draws, start layouts, rejection, how one copy is made |
 //! | `world`, `body`, `articulation`, `gripper`, `contact` | the running physics: objects, their joints, the hand, what it feels |
-//! | `event`, `slip` | what third parties do, and an injected mishap |
+//! | `event`, `mishap` | what third parties do, and mishaps with what is carried |
+//! | `fluent` | regions, named quantities and the rules that change them |
 //! | `oracle`, `state` | the judge and its variables |
 //! | `episode`, `scene`, `truth`, `report` | the handles, the picture, the truth, what is reported |
 //!
@@ -23,8 +24,10 @@ mod episode;
 mod event;
 #[cfg(test)]
 mod expert;
+mod fluent;
 mod gripper;
 mod layout;
+mod mishap;
 mod model;
 mod oracle;
 mod placed;
@@ -35,7 +38,6 @@ mod scenario;
 mod scene;
 #[cfg(test)]
 mod shared_data;
-mod slip;
 mod state;
 #[cfg(test)]
 mod testbed;
@@ -44,6 +46,7 @@ mod world;
 
 pub use episode::{SharedRenderer, Simulation};
 pub use layout::LayoutError;
+pub use mishap::MishapKind;
 pub use oracle::OracleVerdict;
 pub use profile::PhysicsProfile;
 pub use random::DrawError;

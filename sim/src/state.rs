@@ -1,6 +1,7 @@
 //! The judge's variables and their values.
 
 use crate::{
+    fluent,
     layout::Layout,
     oracle::{self, Watch},
     scenario::{ObjectSpec, Scenario, WorldSpec},
@@ -13,7 +14,11 @@ pub(crate) fn names(scenario: &Scenario) -> Vec<String> {
     let objects = spec.objects.iter().map(|o| (o.count.is_none().then_some(o.name.as_str()), &*o.model));
     let places = spec.places.iter().flat_map(|place| ["x", "y", "z"].map(|axis| format!("{}_{axis}", place.name)));
     let scalars = spec.draws.iter().filter(|draw| draw.count.is_none()).map(|draw| draw.name.clone());
-    oracle::names(objects, &places.chain(scalars).collect::<Vec<_>>())
+    let mut names = oracle::names(objects, &places.chain(scalars).collect::<Vec<_>>());
+    let single: Vec<&str> = spec.objects.iter().filter(|o| o.count.is_none()).map(|o| o.name.as_str()).collect();
+    let regions = spec.regions.iter().map(|region| region.name.as_str());
+    names.extend(fluent::names(regions, spec.fluents.iter().map(|fluent| fluent.name.as_str()), &single));
+    names
 }
 
 /// Values of places and plain draws.
@@ -41,6 +46,7 @@ pub(crate) fn fill(world: &World, values: &mut Vec<f64>) {
     for body in world.bodies.iter().filter(|body| !body.is_copy) {
         body.values(physics, &world.contacts, values);
     }
+    world.fluents.fill(world, values);
 }
 
 /// What an object's lamps and gauges show. Copies have no variables of their own, so that theirs show only what the

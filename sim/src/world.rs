@@ -4,23 +4,27 @@ use crate::{
     body::Body,
     contact::{Contacts, TickForces},
     event::{self, Event},
+    fluent::Fluents,
     gripper::{self, Grip, Gripper, TICK_S},
-    layout::{Layout, LayoutError},
+    layout::{Layout, LayoutError, number, vector},
+    mishap::{Mishap, MishapKind},
     model::ObjectModel,
     oracle::{Judge, OracleVerdict},
     placed::Placed,
     profile::PhysicsProfile,
     report::{SimError, SimOptions, SimTimings},
-    scenario::{JudgeSpec, Scenario, SurfaceSpec, WorldSpec},
-    slip::Slip,
+    scenario::{CameraSpec, JudgeSpec, Scenario, SurfaceSpec, WorldSpec},
     state,
     truth::{TrueObject, true_objects},
 };
 use acm_concept::{
+    camera::{CameraModel, Mount},
     embodiment::{Command, EmbodimentError, Feedback, RobotDescription},
+    expression::Expression,
     pose::Pose,
     time::Time,
 };
+use acm_render::{Lighting, PointLight, Sun};
 use rapier3d::prelude::{ColliderBuilder, ColliderHandle, PhysicsWorld, RigidBodyBuilder, Vector};
 use rustix::time::ClockId;
 use std::sync::Arc;
@@ -48,8 +52,14 @@ pub(crate) struct World {
     target: Pose,
     pub(crate) grip: Grip,
     events: Vec<Event>,
-    slip: Option<Slip>,
+    mishaps: Vec<Mishap>,
+    pub(crate) fluents: Fluents,
     judge: Judge,
+    pub(crate) lighting: Lighting,
+    /// Factors by which the cameras' colours are too bright.
+    pub(crate) exposures: Vec<f64>,
+    /// Names of the judge's variables, and their values.
+    pub(crate) variables: Vec<String>,
     pub(crate) state: Vec<f64>,
     pub(crate) constants: Vec<f64>,
     pub(crate) bystanders: Vec<usize>,
@@ -83,7 +93,6 @@ impl World {
         let insert =
             |object: &Placed| Body::insert(&mut physics, object.clone(), spec.objects[object.spec].count.is_some());
         let mut bodies: Vec<Body> = layout.objects.iter().map(insert).collect();
-        let camera = spec.cameras.first().map(|camera| camera.model.clone());
         let robot = gripper::description(spec.home, spec.workspace);
         let gripper = Gripper::build(&mut physics, &robot);
         let variables = state::names(scenario);
@@ -103,7 +112,10 @@ impl World {
             state: vec![0.0; variables.len()],
             target: robot.home,
             grip: Grip { opening_m: robot.max_opening_m, force_n: robot.max_grip_force_n },
-            slip: options.slip_at.map(|carry| Slip::new(carry, options.seed, camera)),
+            mishaps: mishaps(spec, options),
+            fluents: Fluents::build(spec, layout, &variables).map_err(layout_error)?,
+            lighting: lighting(spec, layout).map_err(layout_error)?,
+            exposures: exposures(spec, layout).map_err(layout_error)?,
             contacts: Contacts::default(),
             forces: TickForces::default(),
             timings: SimTimings::default(),
@@ -118,6 +130,7 @@ impl World {
             robot,
             profile,
             physics,
+            variables,
         })
     }
 
@@ -221,7 +234,8 @@ impl World {
         for body in &self.bodies {
             body.act(&mut self.physics, &self.state);
         }
-        self.gripper.drive(&mut self.physics, target, self.grip);
+        let grip = self.mishaps.iter().find_map(|mishap| mishap.grip(self, self.grip)).unwrap_or(self.grip);
+        self.gripper.drive(&mut self.physics, target, grip);
         self.physics.step();
         self.steps += 1;
         for body in &mut self.bodies {
@@ -229,11 +243,13 @@ impl World {
         }
         self.contacts.read(&self.physics, &self.gripper);
         self.forces.add(&self.contacts, self.gripper.wrist_force(&self.physics));
-        // Taken out and put back, because what happens in a slip looks at the whole world.
-        if let Some(mut slip) = self.slip.take() {
-            slip.step(self);
-            self.slip = Some(slip);
+        // Taken out and put back, because what happens in a mishap looks at the whole world.
+        let mut mishaps = std::mem::take(&mut self.mishaps);
+        for mishap in &mut mishaps {
+            mishap.step(self);
         }
+        self.mishaps = mishaps;
+        self.fluents.step(&self.state, self.profile.step_s());
         self.refresh_state();
         self.judge.step(&self.state, self.seconds(), self.profile.step_s());
     }
@@ -242,6 +258,23 @@ impl World {
         let mut values = std::mem::take(&mut self.state);
         state::fill(self, &mut values);
         self.state = values;
+    }
+
+    /// A camera with its pose in the world, wherever it is mounted. The hand's pose is measured without error, so that
+    /// the same serves for the true and for the nominal camera.
+    pub(crate) fn placed(&self, camera: &CameraModel) -> CameraModel {
+        match camera.mount {
+            Mount::World => camera.clone(),
+            Mount::Hand => {
+                let pose = self.gripper.tcp(&self.physics) * camera.pose;
+                CameraModel { pose, ..camera.clone() }
+            }
+        }
+    }
+
+    /// Whether a camera is stuck at its last picture.
+    pub(crate) fn is_frozen(&self, camera: usize) -> bool {
+        self.events.iter().any(|event| event.freezes(camera))
     }
 
     /// Whether someone stands before a camera.
@@ -317,7 +350,8 @@ struct Saved {
     contacts: Contacts,
     judge: Judge,
     events: Vec<Event>,
-    slip: Option<Slip>,
+    mishaps: Vec<Mishap>,
+    fluents: Fluents,
     state: Vec<f64>,
     steps: u64,
     forces: TickForces,
@@ -333,7 +367,8 @@ impl Saved {
             contacts: world.contacts.clone(),
             judge: world.judge.clone(),
             events: world.events.clone(),
-            slip: world.slip.clone(),
+            mishaps: world.mishaps.clone(),
+            fluents: world.fluents.clone(),
             state: world.state.clone(),
             steps: world.steps,
             forces: world.forces.clone(),
@@ -346,7 +381,8 @@ impl Saved {
         world.contacts = self.contacts;
         world.judge = self.judge;
         world.events = self.events;
-        world.slip = self.slip;
+        world.mishaps = self.mishaps;
+        world.fluents = self.fluents;
         world.state = self.state;
         world.steps = self.steps;
         world.forces = self.forces;
@@ -363,6 +399,45 @@ fn insert_surface(physics: &mut PhysicsWorld, surface: &SurfaceSpec) -> Collider
     let body = RigidBodyBuilder::fixed().translation(surface.position.as_vec3());
     let collider = ColliderBuilder::cuboid(half.x, half.y, half.z).friction(surface.friction as f32);
     physics.insert(body, collider).1
+}
+
+/// What the scenario and the run want to go wrong.
+fn mishaps(spec: &WorldSpec, options: &SimOptions) -> Vec<Mishap> {
+    let camera = spec.cameras.first().map(|camera| camera.model.clone());
+    let asked = [(MishapKind::Slip, options.slip_at), (MishapKind::Drop, options.drop_at)];
+    let asked = asked.into_iter().filter_map(|(kind, carry)| Some((kind, carry?)));
+    let all = spec.mishaps.iter().copied().chain(asked);
+    all.map(|(kind, carry)| Mishap::new(kind, carry, options.seed, camera.clone())).collect()
+}
+
+fn lighting(spec: &WorldSpec, layout: &Layout) -> Result<Lighting, LayoutError> {
+    let Some(light) = &spec.lighting else { return Ok(Lighting::default()) };
+    let scope = layout.scope();
+    let number = |expression: &Expression| number("light", expression, &scope);
+    let point = |(position, intensity): &([Expression; 3], Expression)| {
+        Ok(PointLight { position: vector("light", position, &scope)?, intensity: number(intensity)? as f32 })
+    };
+    let direction = vector("light", &light.sun_direction, &scope)?;
+    Ok(Lighting {
+        ambient: number(&light.ambient)? as f32,
+        sun: Sun { direction, intensity: number(&light.sun)? as f32, ..Lighting::default().sun },
+        points: light.points.iter().map(point).collect::<Result<_, LayoutError>>()?,
+    })
+}
+
+fn exposures(spec: &WorldSpec, layout: &Layout) -> Result<Vec<f64>, LayoutError> {
+    let scope = layout.scope();
+    let exposure = |camera: &CameraSpec| {
+        let (name, range) = (&camera.model.name, 0.05..=20.0);
+        let value = number(name, &camera.exposure, &scope)?;
+        let reason = || format!("an exposure of {value} must lie in {} to {}", range.start(), range.end());
+        if range.contains(&value) {
+            Ok(value)
+        } else {
+            Err(LayoutError::Value { name: name.clone(), reason: reason() })
+        }
+    };
+    spec.cameras.iter().map(exposure).collect()
 }
 
 /// Places of the objects that the task is not to move.

@@ -6,7 +6,7 @@ use super::{
     *,
 };
 use acm_concept::{
-    camera::{CameraError, CameraModel, CameraSource, FrameHeader, Intrinsics, RgbdFrame},
+    camera::{CameraError, CameraModel, CameraSource, FrameHeader, Intrinsics, Mount, RgbdFrame},
     embodiment::{Clock, Command, Embodiment, EmbodimentError, Feedback, RobotDescription},
     ids::FrameId,
     pose::Pose,
@@ -39,6 +39,7 @@ fn camera() -> CameraModel {
         pose: Pose::IDENTITY,
         depth_min_m: 0.1,
         depth_max_m: 3.0,
+        mount: Mount::World,
     }
 }
 
@@ -124,6 +125,7 @@ fn task() -> TaskSpec {
         instruction_at_s: 0.25,
         budgets: Budgets { seconds: 10.0, skills: 3, frames: 30 },
         cameras: vec![camera()],
+        then: vec![],
     }
 }
 
