@@ -2,6 +2,7 @@
 
 use crate::{
     body::Body,
+    model::info,
     oracle::OracleVerdict,
     report::{Preview, SimError, SimOptions, SimTimings},
     scenario::{Scenario, TaskTemplate},
@@ -155,6 +156,16 @@ impl Simulation {
     /// The objects as they truly are now. For analysing failures; never for the agent.
     pub fn truth(&self) -> Vec<TrueObject> {
         self.world().truth()
+    }
+
+    /// What each object is made of, for people: its name, and lines about its links and joints.
+    pub fn inventory(&self) -> Vec<(String, Vec<String>)> {
+        let world = self.world();
+        let of = |body: &Body| {
+            let lines = info::lines(&world.models[body.placed.spec], &body.placed.links, &body.joints);
+            (body.placed.name.clone(), lines)
+        };
+        world.bodies.iter().map(of).collect()
     }
 
     /// The judge's variables as they are now, by name. For analysing failures; never for the agent.

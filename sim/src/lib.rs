@@ -36,7 +36,11 @@ mod random;
 mod report;
 mod scenario;
 mod scene;
+#[cfg(test)]
+mod shared_data;
 mod state;
+#[cfg(test)]
+mod testbed;
 mod truth;
 mod world;
 

@@ -8,6 +8,7 @@ use crate::{
     gripper::{self, Grip, Gripper, TICK_S},
     layout::{Layout, LayoutError, number, vector},
     mishap::{Mishap, MishapKind},
+    model::ObjectModel,
     oracle::{Judge, OracleVerdict},
     placed::Placed,
     profile::PhysicsProfile,
@@ -26,6 +27,7 @@ use acm_concept::{
 use acm_render::{Lighting, PointLight, Sun};
 use rapier3d::prelude::{ColliderBuilder, ColliderHandle, PhysicsWorld, RigidBodyBuilder, Vector};
 use rustix::time::ClockId;
+use std::sync::Arc;
 
 /// How long the world settles before the episode begins, seconds.
 const SETTLE_S: f64 = 0.5;
@@ -41,6 +43,8 @@ pub(crate) struct World {
     pub(crate) robot: RobotDescription,
     pub(crate) gripper: Gripper,
     pub(crate) bodies: Vec<Body>,
+    /// Of the scenario's objects, in their order.
+    pub(crate) models: Vec<Arc<ObjectModel>>,
     pub(crate) surfaces: Vec<(ColliderHandle, SurfaceSpec)>,
     pub(crate) contacts: Contacts,
     pub(crate) timings: SimTimings,
@@ -119,6 +123,7 @@ impl World {
             stopped: false,
             steps: 0,
             events,
+            models: spec.objects.iter().map(|object| object.model.clone()).collect(),
             surfaces,
             bodies,
             gripper,

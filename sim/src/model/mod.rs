@@ -6,8 +6,9 @@
 //! | `raw`, `meaning` | model files: text to checked meaning |
 //! | `load`, `normalise` | URDF and MJCF files, and what their dynamics are made into |
 //! | `shape`, `joint` | what a link is made of, and how it hangs on its parent |
-//! | `variables` | names of an object's state |
+//! | `variables`, `info` | names of an object's state, and a description for people |
 
+pub(crate) mod info;
 pub(crate) mod joint;
 pub(crate) mod load;
 mod meaning;

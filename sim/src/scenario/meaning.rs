@@ -538,6 +538,7 @@ impl<'a> Meaning<'a> {
         let index = raw.index.as_ref().map(|index| self.number(field, index, &self.plain_names())).transpose()?;
         Ok(Reference { object, index })
     }
+    /// Names of objects' variables and of some others.
     fn names_with(&self, others: &[String]) -> Vec<String> {
         let named = |object: &'a RawObject| object.count.is_none().then_some(object.name.as_str());
         let objects = self.raw.object.iter().zip(&self.models).map(|(object, model)| (named(object), &**model));

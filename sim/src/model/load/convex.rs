@@ -49,7 +49,7 @@ fn split(part: &Triangles) -> Vec<Hull> {
     }
     let parameters = VHACDParameters {
         // A voxel of about 5 mm.
-        resolution: ((size.max_element() / 0.005) as u32).clamp(24, 96),
+        resolution: ((size.max_element() / 0.005) as u32).clamp(24, 64),
         concavity: 0.001,
         max_convex_hulls: MAX_PARTS,
         fill_mode: FillMode::FloodFill { detect_cavities: false },

@@ -11,7 +11,7 @@ use crate::model::{
 };
 use acm_concept::pose::Pose;
 use glam::{DQuat, DVec3, EulerRot};
-use roxmltree::Document;
+use roxmltree::{Document, Node};
 use std::{
     collections::BTreeMap,
     path::{Path, PathBuf},
@@ -35,38 +35,57 @@ pub(super) fn read(path: &Path, text: &str) -> Result<ObjectModel, String> {
     reader.builder.finish(format!("{} from {}", robot.name, path.display()), fixed)
 }
 
-/// The text with one `<inertial>` a link, and the masses of all of them. Some exporters write one a shape.
+/// The text in the order in which the parser wants it, with one `<inertial>` a link, and the masses of all of them:
+/// some exporters write one for each shape, and what belongs together apart.
 fn mended(text: &str, builder: &mut Builder) -> Result<(String, BTreeMap<String, f64>), String> {
     let document = Document::parse(text).map_err(|e| e.to_string())?;
+    let robot = document.root_element();
+    if !robot.has_tag_name("robot") {
+        return Err(format!("begins with <{}>, not with <robot>", robot.tag_name().name()));
+    }
     let mut masses = BTreeMap::new();
-    let mut cut = Vec::new();
-    for link in document.descendants().filter(|node| node.has_tag_name("link")) {
-        let Some(name) = link.attribute("name") else { continue };
-        let inertials: Vec<_> = link.children().filter(|node| node.has_tag_name("inertial")).collect();
-        let mass = |node: &roxmltree::Node| {
-            node.children().find(|child| child.has_tag_name("mass"))?.attribute("value")?.parse::<f64>().ok()
-        };
-        let known: Vec<f64> = inertials.iter().filter_map(mass).collect();
+    let mut mended = format!("<robot name=\"{}\">", escaped(robot.attribute("name").unwrap_or("robot")));
+    children(robot, "material").for_each(|node| mended.push_str(source(text, node)));
+    for link in children(robot, "link") {
+        let name = link.attribute("name").ok_or("a link has no name")?;
+        let inertials = children(link, "inertial").count();
+        if inertials > 1 {
+            builder.warn(format!("link `{name}` has {inertials} <inertial>; their masses are added"));
+        }
+        let mass = |node: Node| children(node, "mass").next()?.attribute("value")?.parse::<f64>().ok();
+        let known: Vec<f64> = children(link, "inertial").filter_map(mass).collect();
         if !known.is_empty() {
             masses.insert(name.to_string(), known.iter().sum());
         }
-        if inertials.len() > 1 {
-            builder.warn(format!("link `{name}` has {} <inertial>; their masses are added", inertials.len()));
-            cut.extend(inertials.iter().skip(1).map(|node| node.range()));
+        mended.push_str(&format!("<link name=\"{}\">", escaped(name)));
+        let parts =
+            children(link, "inertial").take(1).chain(children(link, "visual")).chain(children(link, "collision"));
+        parts.for_each(|node| mended.push_str(source(text, node)));
+        mended.push_str("</link>");
+    }
+    for joint in children(robot, "joint") {
+        let mut own = source(text, joint).to_string();
+        // The parser insists on the robot's largest speed, which furniture has none of.
+        let limit = children(joint, "limit").next().filter(|limit| !limit.has_attribute("velocity"));
+        if let Some(limit) = limit {
+            own.insert_str(limit.range().start - joint.range().start + "<limit".len(), " velocity=\"0\"");
         }
+        mended.push_str(&own);
     }
-    let mut edits: Vec<(std::ops::Range<usize>, &str)> = cut.into_iter().map(|range| (range, "")).collect();
-    // The parser insists on the robot's largest speed, which furniture has none of.
-    for limit in document.descendants().filter(|node| node.has_tag_name("limit") && !node.has_attribute("velocity")) {
-        let after = limit.range().start + "<limit".len();
-        edits.push((after..after, " velocity=\"0\""));
-    }
-    edits.sort_by_key(|(range, _)| std::cmp::Reverse(range.start));
-    let mut text = text.to_string();
-    for (range, with) in edits {
-        text.replace_range(range, with);
-    }
-    Ok((text, masses))
+    mended.push_str("</robot>");
+    Ok((mended, masses))
+}
+
+fn children<'a>(node: Node<'a, 'a>, name: &'a str) -> impl Iterator<Item = Node<'a, 'a>> {
+    node.children().filter(move |child| child.has_tag_name(name))
+}
+
+fn source<'a>(text: &'a str, node: Node) -> &'a str {
+    text.get(node.range()).unwrap_or_default()
+}
+
+fn escaped(name: &str) -> String {
+    name.replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;")
 }
 
 struct Reader<'a> {
