@@ -6,17 +6,18 @@
 //! | module | holds |
 //! |---|---|
 //! | `scenario`, `model` | scenario files and object models: raw text to checked meaning |
-//! | `random`, `layout` | seeded draws, start layouts, rejection |
-//! | `world`, `body`, `contact` | the running physics: objects, mechanisms, what the pads touch |
+//! | `random`, `layout`, `placed` | seeded draws, start layouts, rejection, how one copy is made |
+//! | `world`, `body`, `articulation`, `contact` | the running physics: objects, their joints, what the pads touch |
 //! | `robot` | robots as data: arms, wrists, hands, their limits and what they feel |
 //! | `event`, `mishap` | what third parties do, and mishaps with what is carried |
 //! | `fluent` | regions, named quantities and the rules that change them |
 //! | `oracle`, `state` | the judge and its variables |
-//! | `episode`, `scene`, `report` | the handles, the picture, what is reported |
+//! | `episode`, `scene`, `truth`, `report` | the handles, the picture, the truth, what is reported |
 //!
 //! Conventions: metres, seconds, newtons; world frame with z up; an object's base frame is the middle of its bottom.
 //! The world advances only when the robot is commanded or the clock waits.
 
+mod articulation;
 mod body;
 mod contact;
 mod convert;
@@ -29,13 +30,19 @@ mod layout;
 mod mishap;
 mod model;
 mod oracle;
+mod placed;
 mod profile;
 mod random;
 mod report;
 mod robot;
 mod scenario;
 mod scene;
+#[cfg(test)]
+mod shared_data;
 mod state;
+#[cfg(test)]
+mod testbed;
+mod truth;
 mod world;
 
 pub use episode::{SharedRenderer, Simulation};
@@ -44,6 +51,7 @@ pub use mishap::MishapKind;
 pub use oracle::OracleVerdict;
 pub use profile::PhysicsProfile;
 pub use random::DrawError;
-pub use report::{Preview, SimError, SimOptions, SimTimings, TrueObject};
+pub use report::{Preview, SimError, SimOptions, SimTimings};
 pub use robot::RobotError;
 pub use scenario::{MAX_SCENARIO_BYTES, Scenario, ScenarioError, Setting};
+pub use truth::{TrueJoint, TrueLink, TrueObject, TruePiece, TrueShape};

@@ -1,11 +1,6 @@
 //! Mishaps with what the hand carries: it is gone and stands somewhere near, or the fingers let it fall.
 
-use crate::{
-    body::Body,
-    event::put,
-    layout::{gap, solids_at},
-    world::World,
-};
+use crate::{body::Body, event::put, layout::gap, placed::solids_at, world::World};
 use acm_concept::{camera::CameraModel, pose::Pose};
 use glam::{DVec2, DVec3};
 use rand::{Rng, SeedableRng};

@@ -1,18 +1,21 @@
 //! The running world: physics, robot, mechanisms, what third parties do, and the judge who watches.
 
 use crate::{
-    body::{Body, true_objects},
+    body::Body,
     contact::Contacts,
     event::{self, Event},
     fluent::Fluents,
-    layout::{Layout, LayoutError, Placed, number, vector},
+    layout::{Layout, LayoutError, number, vector},
     mishap::{Mishap, MishapKind},
+    model::ObjectModel,
     oracle::{Judge, OracleVerdict},
+    placed::Placed,
     profile::PhysicsProfile,
-    report::{SimError, SimOptions, SimTimings, TrueObject},
+    report::{SimError, SimOptions, SimTimings},
     robot::{Robot, TICK_S},
     scenario::{CameraSpec, JudgeSpec, Scenario, SurfaceSpec, WorldSpec},
     state,
+    truth::{TrueObject, true_objects},
 };
 use acm_concept::{
     camera::{CameraModel, Mount},
@@ -24,6 +27,7 @@ use acm_concept::{
 use acm_render::{Lighting, PointLight, Sun};
 use rapier3d::prelude::{ColliderBuilder, ColliderHandle, PhysicsWorld, RigidBodyBuilder, Vector};
 use rustix::time::ClockId;
+use std::sync::Arc;
 
 /// How long the world settles before the episode begins, seconds.
 const SETTLE_S: f64 = 0.5;
@@ -36,6 +40,8 @@ pub(crate) struct World {
     pub(crate) profile: PhysicsProfile,
     pub(crate) robot: Robot,
     pub(crate) bodies: Vec<Body>,
+    /// Of the scenario's objects, in their order.
+    pub(crate) models: Vec<Arc<ObjectModel>>,
     pub(crate) surfaces: Vec<(ColliderHandle, SurfaceSpec)>,
     pub(crate) contacts: Contacts,
     pub(crate) timings: SimTimings,
@@ -79,9 +85,12 @@ impl World {
             spec.surfaces.iter().map(|surface| (insert_surface(&mut physics, surface), surface.clone())).collect();
         let insert =
             |object: &Placed| Body::insert(&mut physics, object.clone(), spec.objects[object.spec].count.is_some());
-        let bodies: Vec<Body> = layout.objects.iter().map(insert).collect();
+        let mut bodies: Vec<Body> = layout.objects.iter().map(insert).collect();
         let robot = Robot::build(&mut physics, &spec.robot);
         let variables = state::names(scenario);
+        for body in &mut bodies {
+            body.set_shows(state::shows(&spec.objects[body.placed.spec], &variables));
+        }
         let layout_error = |source: LayoutError| SimError::Layout {
             scenario: scenario.name.clone(),
             seed: options.seed,
@@ -103,6 +112,7 @@ impl World {
             stopped: false,
             steps: 0,
             events,
+            models: spec.objects.iter().map(|object| object.model.clone()).collect(),
             surfaces,
             bodies,
             robot,
@@ -116,8 +126,14 @@ impl World {
     fn settle(&mut self, seed: u64) -> Result<(), SimError> {
         let start: Vec<Pose> = self.bodies.iter().map(|body| body.pose(&self.physics)).collect();
         for _ in 0..(SETTLE_S / self.profile.step_s()).round() as u32 {
+            for body in &self.bodies {
+                body.act(&mut self.physics, &self.state);
+            }
             self.robot.drive(&mut self.physics, 1.0, false);
             self.physics.step();
+            for body in &mut self.bodies {
+                body.measure(&self.physics);
+            }
         }
         for (body, start) in self.bodies.iter_mut().zip(start) {
             let pose = body.pose(&self.physics);
@@ -127,6 +143,7 @@ impl World {
                 return Err(SimError::Unstable { object: name, seed, turn_deg: turn, shift_m: shift });
             }
             body.start = pose;
+            body.measure(&self.physics);
         }
         self.contacts.read(&self.physics, &self.robot);
         self.refresh_state();
@@ -171,12 +188,15 @@ impl World {
         for event in &mut self.events {
             event.step(&mut self.physics, &mut self.bodies, &self.state, now_s);
         }
+        for body in &self.bodies {
+            body.act(&mut self.physics, &self.state);
+        }
         let drops = self.mishaps.iter().any(|mishap| mishap.drops(self));
         self.robot.drive(&mut self.physics, fraction, drops);
         self.physics.step();
         self.steps += 1;
         for body in &mut self.bodies {
-            body.count_presses(&self.physics);
+            body.measure(&self.physics);
         }
         self.contacts.read(&self.physics, &self.robot);
         self.robot.feel(&self.physics, &self.contacts);

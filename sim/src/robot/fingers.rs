@@ -3,7 +3,7 @@
 use super::wrist::{FINGERS, Wrist, free_body};
 use crate::{
     convert::{from_engine, to_engine, vector},
-    layout::shape,
+    model::shape::shape,
 };
 use acm_concept::{embodiment::RobotDescription, pose::Pose};
 use glam::DVec3;

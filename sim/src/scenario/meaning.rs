@@ -11,7 +11,7 @@ use super::{
 use crate::{
     fluent as state_of,
     mishap::MishapKind,
-    model::ModelLibrary,
+    model::{ModelLibrary, ObjectModel, is_name},
     oracle,
     random::{DrawKind, DrawSpec, StreamKind},
     robot,
@@ -24,6 +24,7 @@ use acm_concept::{
     task::{Budgets, Further},
 };
 use glam::{DMat3, DQuat, DVec3};
+use std::{path::Path, sync::Arc};
 
 const MAX_ITEMS: usize = 64;
 const MAX_ATTEMPTS: u32 = 100_000;
@@ -33,9 +34,7 @@ pub(super) fn parse(file: &str, text: &str) -> Result<Scenario, ScenarioError> {
     let raw: RawScenario = toml::from_str(text).map_err(|e| wrong(suggest(e.to_string())))?;
     let mut models = ModelLibrary::embedded()?;
     for model in &raw.model {
-        let problem = model.problem().map(|reason| ScenarioError::Model { file: file.into(), reason });
-        problem.map_or(Ok(()), Err)?;
-        models.add(model.clone());
+        models.add(model.meaning().map_err(|reason| ScenarioError::Model { file: file.into(), reason })?);
     }
     Meaning::new(file, &raw, models)?.scenario()
 }
@@ -43,7 +42,8 @@ pub(super) fn parse(file: &str, text: &str) -> Result<Scenario, ScenarioError> {
 struct Meaning<'a> {
     file: &'a str,
     raw: &'a RawScenario,
-    models: ModelLibrary,
+    /// Of every object, in their order.
+    models: Vec<Arc<ObjectModel>>,
     /// Draws of one value.
     scalars: Vec<String>,
     /// Draws of several values.
@@ -51,10 +51,14 @@ struct Meaning<'a> {
 }
 
 impl<'a> Meaning<'a> {
-    fn new(file: &'a str, raw: &'a RawScenario, models: ModelLibrary) -> Result<Self, ScenarioError> {
-        let mut meaning = Meaning { file, raw, models, scalars: Vec::new(), lists: Vec::new() };
+    fn new(file: &'a str, raw: &'a RawScenario, mut library: ModelLibrary) -> Result<Self, ScenarioError> {
+        let mut meaning = Meaning { file, raw, models: Vec::new(), scalars: Vec::new(), lists: Vec::new() };
         meaning.check_sizes()?;
         meaning.check_names()?;
+        for object in &raw.object {
+            let model = meaning.model(object, &mut library)?;
+            meaning.models.push(model);
+        }
         for draw in raw.random.iter().flat_map(|random| &random.draw) {
             let (name, is_list) = draw.name_and_shape();
             if is_list { meaning.lists.push(name.into()) } else { meaning.scalars.push(name.into()) }
@@ -328,11 +332,7 @@ impl<'a> Meaning<'a> {
     fn object(&self, at: usize) -> Result<ObjectSpec, ScenarioError> {
         let raw = &self.raw.object[at];
         let field = format!("object `{}`", raw.name);
-        let model = self.models.get(&raw.model).ok_or_else(|| {
-            let known = self.models.names().collect::<Vec<_>>().join(", ");
-            let hint = nearest(&raw.model, self.models.names());
-            self.wrong(&field, format!("there is no object model `{}`{hint}; known: {known}", raw.model))
-        })?;
+        let model = &self.models[at];
         let mut names = self.plain_names();
         if raw.count.is_some() {
             names.extend(self.lists.iter().map(String::as_str));
@@ -356,6 +356,9 @@ impl<'a> Meaning<'a> {
         Ok(ObjectSpec {
             name: raw.name.clone(),
             model: model.clone(),
+            fixed: raw.fixed.unwrap_or(model.fixed),
+            starts: self.starts(&field, raw, model, &names)?,
+            shows: self.shows(&field, raw, model)?,
             count: raw.count.as_ref().map(|count| self.number(&field, count, &self.plain_names())).transpose()?,
             position: self.triple(&field, raw.position.as_ref().unwrap_or(&origin), &names)?,
             yaw: self.number(&field, raw.yaw.as_ref().unwrap_or(&Number::Plain(0.0)), &names)?,
@@ -364,6 +367,59 @@ impl<'a> Meaning<'a> {
             hue_deg: raw.hue_deg.as_ref().map(|hue| self.number(&field, hue, &names)).transpose()?,
             perturb: raw.perturb,
         })
+    }
+
+    fn model(&self, raw: &RawObject, library: &mut ModelLibrary) -> Result<Arc<ObjectModel>, ScenarioError> {
+        let field = format!("object `{}`", raw.name);
+        match (&raw.model, &raw.model_file) {
+            (Some(name), None) => library.get(name).cloned().ok_or_else(|| {
+                let known = library.names().collect::<Vec<_>>().join(", ");
+                let hint = nearest(name, library.names());
+                self.wrong(&field, format!("there is no object model `{name}`{hint}; known: {known}"))
+            }),
+            (None, Some(file)) => {
+                let folder = Path::new(self.file).parent().unwrap_or(Path::new(""));
+                library.load(file, folder).map_err(|reason| self.wrong(format!("{field}.model_file"), reason))
+            }
+            _ => Err(self.wrong(field, "needs either `model` or `model_file`")),
+        }
+    }
+
+    fn starts(
+        &self,
+        field: &str,
+        raw: &RawObject,
+        model: &ObjectModel,
+        names: &[&str],
+    ) -> Result<Vec<(usize, Expression)>, ScenarioError> {
+        let known = || model.joints().map(|(link, _)| model.links[link].name.as_str());
+        let start = |(name, number): (&String, &Number)| {
+            let found = model.joints().find(|(link, _)| model.links[*link].name == *name);
+            let Some((link, _)) = found else {
+                let reason = format!("there is no joint `{name}`{}", nearest(name, known()));
+                return Err(self.wrong(format!("{field}.joints"), reason));
+            };
+            Ok((link, self.number(&format!("{field}.joints.{name}"), number, names)?))
+        };
+        raw.joints.iter().map(start).collect()
+    }
+
+    fn shows(
+        &self,
+        field: &str,
+        raw: &RawObject,
+        model: &ObjectModel,
+    ) -> Result<Vec<(String, Expression)>, ScenarioError> {
+        let known = self.variables();
+        let shown = |(name, text): (&String, &String)| {
+            if !model.shows().any(|(known, _)| known == name) {
+                let hint = nearest(name, model.shows().map(|(known, _)| known));
+                return Err(self.wrong(format!("{field}.shows"), format!("there is no lamp or gauge `{name}`{hint}")));
+            }
+            let expression = self.expression(&format!("{field}.shows.{name}"), text, &as_strs(&known))?;
+            Ok((name.clone(), expression))
+        };
+        raw.shows.iter().map(shown).collect()
     }
 
     fn place(&self, raw: &RawPlace) -> Result<PlaceSpec, ScenarioError> {
@@ -424,6 +480,13 @@ impl<'a> Meaning<'a> {
         for name in &raw.moves {
             self.known_object("judge.moves", name)?;
         }
+        // A draw may be called as an object's variable is and then hides it; two objects' variables may not.
+        let of_objects = self.names_with(&[]);
+        if let Some(twice) = of_objects.iter().enumerate().find(|(at, name)| of_objects[..*at].contains(name)) {
+            return Err(
+                self.wrong(format!("name `{}`", twice.1), "stands for two things; rename the object or the joint")
+            );
+        }
         let known = self.variables();
         let known = as_strs(&known);
         Ok(JudgeSpec {
@@ -473,15 +536,15 @@ impl<'a> Meaning<'a> {
         let index = raw.index.as_ref().map(|index| self.number(field, index, &self.plain_names())).transpose()?;
         Ok(Reference { object, index })
     }
-    /// An object's name if it has no copies, and whether it has a button.
-    fn visible_to_judge(&self, object: &'a RawObject) -> (Option<&'a str>, bool) {
-        let button = self.models.get(&object.model).is_some_and(|model| model.button.is_some());
-        (object.count.is_none().then_some(object.name.as_str()), button)
+    /// Names of objects' variables and of some others.
+    fn names_with(&self, others: &[String]) -> Vec<String> {
+        let named = |object: &'a RawObject| object.count.is_none().then_some(object.name.as_str());
+        let objects = self.raw.object.iter().zip(&self.models).map(|(object, model)| (named(object), &**model));
+        oracle::names(objects, others)
     }
     /// All variables of the judge, of events and of rules.
     fn variables(&self) -> Vec<String> {
-        let objects = self.raw.object.iter().map(|object| self.visible_to_judge(object));
-        let mut names = oracle::names(objects, &self.others());
+        let mut names = self.names_with(&self.others());
         let single: Vec<&str> =
             self.raw.object.iter().filter(|o| o.count.is_none()).map(|object| object.name.as_str()).collect();
         let regions = self.raw.region.iter().map(|region| region.name.as_str());
@@ -535,12 +598,6 @@ impl RawDraw {
             RawDraw::Permutation { name, .. } => (name, true),
         }
     }
-}
-
-fn is_name(name: &str) -> bool {
-    name.starts_with(|c: char| c.is_ascii_lowercase())
-        && name.len() <= 40
-        && name.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_')
 }
 
 fn as_strs(names: &[String]) -> Vec<&str> {

@@ -13,6 +13,7 @@ use acm_concept::{
     task::{Budgets, Further},
 };
 use glam::DVec3;
+use std::sync::Arc;
 
 /// What the simulator builds.
 #[derive(Debug, Clone)]
@@ -104,7 +105,12 @@ pub(crate) enum RejectRule {
 #[derive(Debug, Clone)]
 pub(crate) struct ObjectSpec {
     pub(crate) name: String,
-    pub(crate) model: ObjectModel,
+    pub(crate) model: Arc<ObjectModel>,
+    pub(crate) fixed: bool,
+    /// Links, and where their joints start.
+    pub(crate) starts: Vec<(usize, Expression)>,
+    /// Lamps and gauges, and what they show instead of what the model says.
+    pub(crate) shows: Vec<(String, Expression)>,
     pub(crate) count: Option<Expression>,
     pub(crate) position: [Expression; 3],
     pub(crate) yaw: Expression,
