@@ -209,7 +209,7 @@ mod tests {
             wrist_force_n: DVec3::ZERO,
             ..acm_concept::embodiment::Feedback::default()
         };
-        let hand = Hand::new(&robot(), &feedback);
+        let hand = Hand::of_arm(&robot(), &feedback, 0);
         let height = |obstacle| safe_height(&hand, DVec3::ZERO, DVec3::X * 0.3, &[obstacle], 0.0, 0.03);
         assert_eq!(height(cube(0.15, 0.6, 0.2)), Ok(0.07));
         assert_eq!(height(cube(0.15, 0.0, 0.2)), Ok(0.22 + 0.03 + SAFETY_M));

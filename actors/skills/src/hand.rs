@@ -44,11 +44,8 @@ pub(crate) struct Hand {
 }
 
 impl Hand {
-    /// The hand of the arm that was commanded last. Begins where it is and takes the force it feels now as its baseline.
-    pub fn new(robot: &RobotDescription, feedback: &Feedback) -> Hand {
-        Hand::of_arm(robot, feedback, feedback.arm)
-    }
-    /// The hand of one arm, which keeps clear of the others.
+    /// The hand of one arm, which keeps clear of the others. Begins where it is and takes the force it feels now as its
+    /// baseline.
     pub fn of_arm(robot: &RobotDescription, feedback: &Feedback, arm: usize) -> Hand {
         let own = feedback.of_arm(arm).unwrap_or(feedback);
         Hand::among(&robot.only(arm), own, &[], &other_arms(robot, feedback, arm))

@@ -2,6 +2,7 @@
 
 use super::{Aim, Limb};
 use acm_concept::embodiment::{Command, RobotDescription};
+use glam::DVec3;
 
 /// Commands may exceed the speed limits by this factor, which absorbs rounding.
 const TOLERANCE: f64 = 1.0 + 1e-6;
@@ -39,7 +40,6 @@ pub(super) fn aim(limb: &Limb, others: &[&Limb], command: &Command) -> Result<Ai
         }
     };
     speed(limb, &aim)?;
-    // An arm's own wrist may have been pressed a hair out of the box; what counts is where it is sent.
     if !inside(robot, &aim) {
         let (low, high) = (robot.workspace_min, robot.workspace_max);
         return Err(format!("{} lies outside of the workspace {low} to {high} m", aim.tcp.translation));
@@ -56,8 +56,9 @@ pub(super) fn aim(limb: &Limb, others: &[&Limb], command: &Command) -> Result<Ai
     collision(limb, others, &aim).map_or(Ok(aim), Err)
 }
 
+/// Where joints put the hand is known to rounding.
 fn inside(robot: &RobotDescription, aim: &Aim) -> bool {
-    let (at, slack) = (aim.tcp.translation, glam::DVec3::splat(1e-9));
+    let (at, slack) = (aim.tcp.translation, DVec3::splat(1e-9));
     at.cmpge(robot.workspace_min - slack).all() && at.cmple(robot.workspace_max + slack).all()
 }
 
