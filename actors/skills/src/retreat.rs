@@ -22,7 +22,7 @@ const THERE_M: f64 = 0.005;
 const COLLISION_N: f64 = 30.0;
 
 /// A running retreat: straight up to the height of home, level to above it, then to it. Fingers stay as they are. Arms go
-/// home one after the other, the one that moved last first.
+/// home one after the other; the one that moved last stays the one that is reported, and so goes last.
 #[derive(Debug)]
 pub struct Retreat {
     robot: RobotDescription,
@@ -75,8 +75,10 @@ pub fn retreat(robot: &RobotDescription, feedback: &Feedback) -> Retreat {
         let here = feedback.of_arm(*arm).map(|felt| felt.tcp.translation);
         home.zip(here).is_some_and(|(home, here)| home.distance(here) > THERE_M)
     };
-    let waiting = (0..robot.arms()).rev().filter(|arm| *arm != feedback.arm).filter(away).collect();
-    let flight = Flight::begin(robot, feedback, feedback.arm);
+    let mut waiting = vec![feedback.arm];
+    waiting.extend((0..robot.arms()).rev().filter(|arm| *arm != feedback.arm).filter(away));
+    let first = waiting.pop().unwrap_or(feedback.arm);
+    let flight = Flight::begin(robot, feedback, first);
     Retreat { robot: robot.clone(), flight, waiting, started: None, failure: None, finished: None }
 }
 
