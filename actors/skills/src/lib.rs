@@ -31,9 +31,11 @@
 //!
 //! The hand works pointing down: the TCP's z axis along the world's -z.
 
+mod advance;
+mod approach;
+mod articulation;
 mod clearance;
 pub mod controller;
-mod descent;
 mod functions;
 mod geometry;
 mod hand;
@@ -41,6 +43,7 @@ mod motion;
 mod primitives;
 pub mod retreat;
 mod run;
+mod sequence;
 
 pub use controller::{Controller, StartError, Tick, kinds, start};
 pub use retreat::{Retreat, RetreatTick, retreat};

@@ -13,7 +13,7 @@ use crate::{
     hand::{Hand, holds_something, pads_in_contact},
     motion::{Pace, Path},
     primitives::{Carry, Failure, GripWatch, Lower, Outcome, Reach, Release},
-    run::{Function, Next, Notes},
+    run::{Function, Next, Notes, WayOut},
 };
 use acm_concept::{
     embodiment::Feedback,
@@ -182,8 +182,8 @@ impl Function for PlaceUpright {
             Stage::Leaving | Stage::Opening => Next::Done,
         }
     }
-    fn withdraw_height_m(&self) -> f64 {
-        self.leave_height_m
+    fn way_out(&self) -> WayOut {
+        WayOut::Up(self.leave_height_m)
     }
     fn object(&self) -> ObjectId {
         self.object
