@@ -3,7 +3,7 @@
 //! The destination is where the base of what is held shall be when it is in. Arguments: `depth`, how deep its tip goes
 //! beyond the rim, and `clearance`, width of the opening less that of what goes in, metres; `axis_x`, `axis_y`,
 //! `axis_z`, the direction into the opening in the base frame of what is held there (straight down if absent);
-//! `keep`, above 0 if the fingers shall keep hold.
+//! `partial`, above 0 where no ground is met at that depth; `keep`, above 0 if the fingers shall keep hold.
 
 use super::{argument, ending, number};
 use crate::{
@@ -51,6 +51,8 @@ impl InsertAlong {
         let direction = place.pose.transform_vector(axis);
         let inserted = place.pose * base_in_tcp.inverse();
         let hover = Pose::new(inserted.translation - (depth_m + HOVER_M) * direction, inserted.rotation);
+        // Its base goes in first, unless an axis says otherwise: then its middle line is taken for the tip's way.
+        let tip_m = (place.pose.translation - inserted.translation).dot(direction).max(0.0);
         within_reach(&hand.robot, "the pose before the opening", hover.translation)?;
         within_reach(&hand.robot, "the pose in the opening", inserted.translation)?;
         let obstacles = obstacles(invocation, invocation.support_height_m);
@@ -59,7 +61,14 @@ impl InsertAlong {
             base_in_tcp: *base_in_tcp,
             hover,
             around: Surroundings { obstacles, floor_m: invocation.support_height_m },
-            plan: InsertPlan { direction, rim_m: HOVER_M, depth_m, clearance_m },
+            plan: InsertPlan {
+                direction,
+                rim_m: HOVER_M,
+                depth_m,
+                clearance_m,
+                grounded: number(invocation, "partial", 0.0) <= 0.0,
+                tip_m,
+            },
             keep: number(invocation, "keep", 0.0) > 0.0,
             gap_m: feedback.opening_m,
             withdraw_m: hover.translation.z + 0.05,

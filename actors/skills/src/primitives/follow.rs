@@ -180,10 +180,14 @@ impl Follow {
         self.over_ticks = if force.length() > CAP_N { self.over_ticks + 1 } else { 0 };
         self.reached = self.sign * self.joint.travel(&measured_from, &feedback.tcp, self.sign * self.commanded);
         let grip = match &mut self.plan.hold {
-            Hold::Fingers(watch) => match watch.check(hand, feedback) {
-                Ok(grip) => grip,
-                Err(failure) => return Step::Failed(failure),
-            },
+            Hold::Fingers(watch) => {
+                // What is drawn must not turn between the fingers.
+                hand.command.grip_force_n = hand.robot.max_grip_force_n;
+                match watch.check(hand, feedback) {
+                    Ok(grip) => grip,
+                    Err(failure) => return Step::Failed(failure),
+                }
+            }
             Hold::Contact => {
                 let steady = self.speed > 0.99 * self.full_speed;
                 self.touch.take(-feedback.wrist_force_n.dot(heading), steady, self.reached);

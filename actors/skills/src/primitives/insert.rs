@@ -10,8 +10,8 @@ use crate::{
     advance::{Advance, Progress},
     hand::Hand,
 };
-use acm_concept::{embodiment::Feedback, primitive::Primitive as Kind, skill::FailureCause};
-use glam::{DVec2, DVec3};
+use acm_concept::{embodiment::Feedback, pose::Pose, primitive::Primitive as Kind, skill::FailureCause};
+use glam::{DQuat, DVec2, DVec3};
 use std::f64::consts::TAU;
 
 /// Speed towards the opening, m/s.
@@ -42,22 +42,29 @@ const LOOK_S: f64 = 0.3;
 const LOOK_YIELDING_M_S_N: f64 = 2e-3;
 /// Speed within the opening, m/s, and the force that is used there, newtons.
 const SINK_M_S: f64 = 0.02;
-const SINK_N: f64 = 14.0;
+const SINK_N: f64 = 12.0;
 /// Sideways yielding within the opening, m/s for a newton.
 const YIELDING_M_S_N: f64 = 6e-4;
 /// Shaking when it jams: amplitude in metres, turns in a second.
 const SHAKE_M: f64 = 3e-4;
 const SHAKE_HZ: f64 = 4.0;
+/// With it the hand rocks about the direction in which its fingers close, in which what is held may have tilted: largest
+/// angle in radians, and turns in a second. It stays as it is as long as it goes deeper.
+const ROCK_RAD: f64 = 0.09;
+const ROCK_HZ: f64 = 0.8;
 /// It jams for good when it has not gone deeper by this, metres, for so long, seconds.
 const JAM_M: f64 = 3e-4;
-const JAM_S: f64 = 1.5;
+const JAM_S: f64 = 2.6;
 /// So often a jam ends in another try: from the next place if it is shallow, that is within so many entries of the rim,
 /// else a little higher.
 const MAX_RETRIES: u32 = 6;
 const SHALLOW: f64 = 3.0;
 const RETRY_M: f64 = 4e-3;
-/// A ground is believed in when the force has stood for so long, seconds.
+/// A ground is believed in when the force has stood for so long, seconds, and is no more than this before its time.
 const GROUND_S: f64 = 0.1;
+const EARLY_M: f64 = 1e-3;
+/// How far beyond the expected depth the ground is looked for, metres: what is held may have slid up between the fingers.
+const BEYOND_M: f64 = 8e-3;
 /// The share of the depth that counts as inserted.
 const DEEP_SHARE: f64 = 0.8;
 /// The test at the end: how far beyond the clearance the hand goes sideways, metres; how fast, m/s; what it must feel, newtons.
@@ -78,6 +85,10 @@ pub(crate) struct InsertPlan {
     pub depth_m: f64,
     /// Width of the opening less that of what goes in, metres.
     pub clearance_m: f64,
+    /// Whether the ground is met at that depth; else it is enough to be that deep.
+    pub grounded: bool,
+    /// How far the tip is from the TCP along the direction, metres.
+    pub tip_m: f64,
 }
 
 #[derive(Debug)]
@@ -108,7 +119,9 @@ struct Place {
 pub(crate) struct Insert {
     plan: InsertPlan,
     watch: GripWatch,
-    start: DVec3,
+    start: Pose,
+    /// Phase of the rocking, radians.
+    rock: f64,
     /// Where the commanded TCP is sideways of the start, in the plane across the direction, without spiral and shaking.
     centre: DVec2,
     /// How far it is commanded along the direction.
@@ -126,7 +139,7 @@ pub(crate) struct Insert {
 
 impl Insert {
     pub fn new(hand: &Hand, plan: InsertPlan, watch: GripWatch) -> Insert {
-        let travel_m = plan.rim_m + plan.depth_m;
+        let travel_m = plan.rim_m + ENTRY_M + 0.5 * plan.depth_m;
         let advance = Advance::new(hand, plan.direction, travel_m, APPROACH_M_S, TOUCH_N);
         let (u, v) = plan.direction.any_orthonormal_pair();
         let pitch_m = pitch(&plan);
@@ -135,7 +148,8 @@ impl Insert {
         Insert {
             plan,
             watch,
-            start: hand.command.tcp.translation,
+            start: hand.command.tcp,
+            rock: 0.0,
             centre: DVec2::ZERO,
             along_m: 0.0,
             across: [u, v],
@@ -152,7 +166,19 @@ impl Insert {
     fn command(&self, hand: &mut Hand, aside: DVec2) {
         let at = self.centre + aside;
         let [u, v] = self.across;
-        hand.command.tcp.translation = self.start + self.along_m * self.plan.direction + at.x * u + at.y * v;
+        let InsertPlan { direction, tip_m, .. } = self.plan;
+        let turn = self.start.rotation * DQuat::from_rotation_y(ROCK_RAD * self.rock.sin()) * self.start.rotation.inverse();
+        // Rocking leaves the tip where it is.
+        let tip = self.start.translation + (self.along_m + tip_m) * direction + at.x * u + at.y * v;
+        hand.command.tcp = Pose::new(tip - tip_m * (turn * direction), (turn * self.start.rotation).normalize());
+    }
+
+    /// How far the tip has gone along the direction, as the measured TCP tells, metres.
+    fn along(&self, feedback: &Feedback) -> f64 {
+        let InsertPlan { direction, tip_m, .. } = self.plan;
+        let turn = feedback.tcp.rotation * self.start.rotation.inverse();
+        let tip = feedback.tcp.translation + tip_m * (turn * direction);
+        (tip - self.start.translation).dot(direction) - tip_m
     }
 
     /// Sideways force, in the plane across the direction.
@@ -178,7 +204,7 @@ impl Insert {
         match progress {
             Progress::Onward => {}
             Progress::End => self.phase = sink(self.plan.rim_m, at_m),
-            Progress::Touched if at_m > self.plan.rim_m + ENTRY_M.max(0.5 * self.plan.depth_m) => {
+            Progress::Touched if at_m > self.plan.rim_m + 2.0 * ENTRY_M => {
                 self.phase = sink(self.plan.rim_m, at_m);
             }
             Progress::Touched => {
@@ -258,8 +284,14 @@ impl Insert {
         }
         let deep = depth_m >= DEEP_SHARE * self.plan.depth_m;
         *ground_ticks = if deep && resistance_n > 0.6 * SINK_N { *ground_ticks + 1 } else { 0 };
-        let whole = depth_m >= self.plan.depth_m - 1e-4;
-        if *ground_ticks > hand.ticks(GROUND_S) || whole || (deep && *stuck_ticks > hand.ticks(0.5 * JAM_S)) {
+        // A ground that comes too early may be a jam: it is believed in when rocking has not helped.
+        let near = depth_m > self.plan.depth_m - EARLY_M;
+        let ground_s = if near { GROUND_S } else { 0.7 * JAM_S };
+        let whole = !self.plan.grounded && depth_m >= self.plan.depth_m - 1e-4;
+        if depth_m > self.plan.depth_m + BEYOND_M {
+            return failed(format!("{:.1} mm beyond the expected depth there is no ground", 1e3 * BEYOND_M));
+        }
+        if *ground_ticks > hand.ticks(ground_s) || whole {
             self.along_m = at_m - LIFT_M;
             self.phase = Phase::Probe { depth_m, leg: 0, gone_m: 0.0, most_n: 0.0 };
             self.command(hand, DVec2::ZERO);
@@ -286,6 +318,9 @@ impl Insert {
         let shaking = *stuck_ticks > hand.ticks(0.12);
         self.centre += YIELDING_M_S_N * tick_s * side_n;
         self.press(hand, SINK_N, SINK_M_S * tick_s);
+        if shaking {
+            self.rock += TAU * ROCK_HZ * tick_s;
+        }
         let phase = TAU * SHAKE_HZ * f64::from(self.ticks) * tick_s;
         let aside = if shaking { SHAKE_M * DVec2::from_angle(phase) } else { DVec2::ZERO };
         self.command(hand, aside);
@@ -338,7 +373,7 @@ impl Primitive for Insert {
         hand.command.grip_force_n = hand.robot.max_grip_force_n;
         self.ticks += 1;
         self.most_n = self.most_n.max(self.resistance_n(hand));
-        let at_m = (feedback.tcp.translation - self.start).dot(self.plan.direction);
+        let at_m = self.along(feedback);
         match self.phase {
             Phase::Approach(_) => self.approach(hand, at_m),
             Phase::Shift(_) => self.shift(hand),

@@ -81,6 +81,10 @@ impl Thing {
     fn top(&self, base: Pose) -> Pose {
         base * Pose::from_translation(DVec3::Z * (self.height - 0.02f64.min(0.5 * self.height)))
     }
+    /// The same as deep as the fingers reach: what is drawn over the table is best taken low.
+    fn deep(&self, base: Pose) -> Pose {
+        base * Pose::from_translation(DVec3::Z * (self.height - 0.034f64.min(0.5 * self.height)))
+    }
     /// The frame in which it is taken from its +x side: z level and out, y level.
     fn side(&self, base: Pose) -> Pose {
         let out = DQuat::from_rotation_z(FRAC_PI_2) * DQuat::from_rotation_x(FRAC_PI_2);
@@ -157,7 +161,7 @@ impl<'a> Stage<'a> {
         }
         if let Some(at_s) = slip_s {
             objects += &format!(
-                "[[event]]\nname = \"slip\"\nafter_s = {at_s}\nover_s = 0.004\ncarry = {{ object = \"thing\" }}\nto = [0.9, 0.9, {TABLE_M}]\n"
+                "[[event]]\nname = \"slip\"\nafter_s = {at_s}\nover_s = 0.02\ncarry = {{ object = \"thing\" }}\nto = [0.9, 0.9, {TABLE_M}]\n"
             );
         }
         let rig = Rig::new(&scenario(&models, &objects, values.get("friction")), seed)?;
@@ -194,7 +198,7 @@ impl<'a> Stage<'a> {
             }
             Primitive::Pull => {
                 let arguments = [arguments.clone(), vec![("travel", self.values.metres("travel"))]].concat();
-                self.test(invocation("pull-along", THING, base, thing.top(base), &arguments))
+                self.test(invocation("pull-along", THING, base, thing.deep(base), &arguments))
             }
             Primitive::Push => {
                 let side = base * Pose::new(DVec3::new(0.5 * thing.depth, 0.0, 0.5 * thing.height), DQuat::from_rotation_y(FRAC_PI_2));
