@@ -44,7 +44,7 @@ fn preview(file: &str, seed: u64, out: &Path, info: bool) -> anyhow::Result<()> 
         .with_context(|| format!("the picture {} cannot be written", out.display()))?;
     println!("{} seed {seed} -> {}", scenario.name(), out.display());
     if info {
-        for object in simulation.truth() {
+        for (object, (_, lines)) in simulation.truth().into_iter().zip(simulation.inventory()) {
             let at = object.pose.translation;
             println!(
                 "  {:<12} {:<14} at ({:.3}, {:.3}, {:.3}) heading {:.1} deg",
@@ -55,6 +55,9 @@ fn preview(file: &str, seed: u64, out: &Path, info: bool) -> anyhow::Result<()> 
                 at.z,
                 object.pose.yaw().to_degrees()
             );
+            for line in lines {
+                println!("    {line}");
+            }
         }
     }
     Ok(())

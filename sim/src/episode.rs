@@ -2,10 +2,12 @@
 
 use crate::{
     body::Body,
+    model::info,
     oracle::OracleVerdict,
-    report::{Preview, SimError, SimOptions, SimTimings, TrueObject},
+    report::{Preview, SimError, SimOptions, SimTimings},
     scenario::{Scenario, TaskTemplate},
     scene::{Ids, Stage, fnv, state_hash},
+    truth::TrueObject,
     world::{World, cpu_s},
 };
 use acm_concept::{
@@ -137,8 +139,11 @@ impl Simulation {
         let rounded = |v: glam::DVec3| (v * 1e4).round().as_i64vec3();
         let line = |body: &Body| {
             let yaw = (body.start.yaw() * 1e2).round() as i64;
-            let color = body.placed.solids.first().map(|solid| solid.color);
-            format!("{} {yaw} {} {color:?}", rounded(body.start.translation), rounded(body.placed.size()))
+            let color = body.placed.color();
+            let joints: Vec<i64> =
+                body.joints.iter().map(|(_, joint)| (joint.joint.start * 1e3).round() as i64).collect();
+            let (at, size) = (rounded(body.start.translation), rounded(body.placed.size()));
+            format!("{at} {yaw} {size} {color:?} {joints:?}")
         };
         let mut lines: Vec<String> = world.bodies.iter().map(line).collect();
         lines.sort();
@@ -148,6 +153,16 @@ impl Simulation {
     /// The objects as they truly are now. For analysing failures; never for the agent.
     pub fn truth(&self) -> Vec<TrueObject> {
         self.world().truth()
+    }
+
+    /// What each object is made of, for people: its name, and lines about its links and joints.
+    pub fn inventory(&self) -> Vec<(String, Vec<String>)> {
+        let world = self.world();
+        let of = |body: &Body| {
+            let lines = info::lines(&world.models[body.placed.spec], &body.placed.links, &body.joints);
+            (body.placed.name.clone(), lines)
+        };
+        world.bodies.iter().map(of).collect()
     }
 
     /// Processor time taken so far.

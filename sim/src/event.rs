@@ -3,7 +3,7 @@
 
 use crate::{
     body::Body,
-    convert::to_engine,
+    convert::{from_engine, to_engine},
     layout::{Layout, LayoutError, number, vector},
     oracle::Watch,
     scenario::{DeedSpec, EventSpec, WorldSpec},
@@ -126,11 +126,15 @@ fn carry(world: &mut PhysicsWorld, body: &Body, pose: &Pose) {
     }
 }
 
-/// Sets an object down at rest.
+/// Sets an object down at rest, its parts as they are to each other.
 pub(crate) fn put(world: &mut PhysicsWorld, body: &Body, pose: &Pose) {
-    if let Some(body) = world.bodies.get_mut(body.handle) {
-        body.set_position(to_engine(pose), true);
-        body.set_linvel(Default::default(), true);
-        body.set_angvel(Default::default(), true);
+    let shift = *pose * body.pose(world).inverse();
+    for handle in body.handles() {
+        if let Some(part) = world.bodies.get_mut(handle) {
+            let moved = if handle == body.handle { *pose } else { shift * from_engine(part.position()) };
+            part.set_position(to_engine(&moved), true);
+            part.set_linvel(Default::default(), true);
+            part.set_angvel(Default::default(), true);
+        }
     }
 }

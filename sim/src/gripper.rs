@@ -5,7 +5,7 @@
 
 use crate::{
     convert::{from_engine, to_engine, vector},
-    layout::shape,
+    model::shape::shape,
 };
 use acm_concept::{
     embodiment::RobotDescription,

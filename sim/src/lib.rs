@@ -6,15 +6,16 @@
 //! | module | holds |
 //! |---|---|
 //! | `scenario`, `model` | scenario files and object models: raw text to checked meaning |
-//! | `random`, `layout` | seeded draws, start layouts, rejection |
-//! | `world`, `body`, `gripper`, `contact` | the running physics: objects, mechanisms, the hand, what it feels |
+//! | `random`, `layout`, `placed` | seeded draws, start layouts, rejection, how one copy is made |
+//! | `world`, `body`, `articulation`, `gripper`, `contact` | the running physics: objects, their joints, the hand, what it feels |
 //! | `event`, `slip` | what third parties do, and an injected mishap |
 //! | `oracle`, `state` | the judge and its variables |
-//! | `episode`, `scene`, `report` | the handles, the picture, what is reported |
+//! | `episode`, `scene`, `truth`, `report` | the handles, the picture, the truth, what is reported |
 //!
 //! Conventions: metres, seconds, newtons; world frame with z up; an object's base frame is the middle of its bottom.
 //! The world advances only when the robot is commanded or the clock waits.
 
+mod articulation;
 mod body;
 mod contact;
 mod convert;
@@ -26,13 +27,19 @@ mod gripper;
 mod layout;
 mod model;
 mod oracle;
+mod placed;
 mod profile;
 mod random;
 mod report;
 mod scenario;
 mod scene;
+#[cfg(test)]
+mod shared_data;
 mod slip;
 mod state;
+#[cfg(test)]
+mod testbed;
+mod truth;
 mod world;
 
 pub use episode::{SharedRenderer, Simulation};
@@ -40,5 +47,6 @@ pub use layout::LayoutError;
 pub use oracle::OracleVerdict;
 pub use profile::PhysicsProfile;
 pub use random::DrawError;
-pub use report::{Preview, SimError, SimOptions, SimTimings, TrueObject};
+pub use report::{Preview, SimError, SimOptions, SimTimings};
 pub use scenario::{MAX_SCENARIO_BYTES, Scenario, ScenarioError};
+pub use truth::{TrueJoint, TrueLink, TrueObject, TruePiece, TrueShape};

@@ -1,9 +1,7 @@
 //! What goes into a simulation and what is read off it.
 
 use crate::{layout::LayoutError, scenario::ScenarioError};
-use acm_concept::pose::Pose;
 use acm_render::{MeshError, RenderError, sensor::UnknownProfile};
-use glam::DVec3;
 use serde::Serialize;
 use thiserror::Error;
 
@@ -37,23 +35,6 @@ pub struct SimTimings {
     pub render_s: f64,
     /// Sensor model: of the calling thread.
     pub noise_s: f64,
-}
-
-/// An object as it truly is. For analysing failures and for drawing; never for the agent.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct TrueObject {
-    /// Name in the scenario, with `_0`, `_1`, ... for copies.
-    pub name: String,
-    /// Its model.
-    pub model: String,
-    /// Pose of its base frame (the middle of its bottom) in the world.
-    pub pose: Pose,
-    /// Extents along the axes of its base frame, metres.
-    pub size_m: DVec3,
-    /// Colour of its first solid, 8-bit sRGB.
-    pub color: [u8; 3],
-    /// Whether both pads touch it.
-    pub held: bool,
 }
 
 /// The start of an episode as its main camera would see it without any error.

@@ -1,11 +1,6 @@
 //! An injected mishap: an object is taken out of the hand unseen and set down somewhere near.
 
-use crate::{
-    body::Body,
-    event::put,
-    layout::{gap, solids_at},
-    world::World,
-};
+use crate::{body::Body, event::put, layout::gap, placed::solids_at, world::World};
 use acm_concept::{camera::CameraModel, pose::Pose};
 use glam::{DVec2, DVec3};
 use rand::{Rng, SeedableRng};

@@ -1,17 +1,20 @@
 //! The running world: physics, hand, mechanisms, what third parties do, and the judge who watches.
 
 use crate::{
-    body::{Body, true_objects},
+    body::Body,
     contact::{Contacts, TickForces},
     event::{self, Event},
     gripper::{self, Grip, Gripper, TICK_S},
-    layout::{Layout, LayoutError, Placed},
+    layout::{Layout, LayoutError},
+    model::ObjectModel,
     oracle::{Judge, OracleVerdict},
+    placed::Placed,
     profile::PhysicsProfile,
-    report::{SimError, SimOptions, SimTimings, TrueObject},
+    report::{SimError, SimOptions, SimTimings},
     scenario::{JudgeSpec, Scenario, SurfaceSpec, WorldSpec},
     slip::Slip,
     state,
+    truth::{TrueObject, true_objects},
 };
 use acm_concept::{
     embodiment::{Command, EmbodimentError, Feedback, RobotDescription},
@@ -20,6 +23,7 @@ use acm_concept::{
 };
 use rapier3d::prelude::{ColliderBuilder, ColliderHandle, PhysicsWorld, RigidBodyBuilder, Vector};
 use rustix::time::ClockId;
+use std::sync::Arc;
 
 /// How long the world settles before the episode begins, seconds.
 const SETTLE_S: f64 = 0.5;
@@ -35,6 +39,8 @@ pub(crate) struct World {
     pub(crate) robot: RobotDescription,
     pub(crate) gripper: Gripper,
     pub(crate) bodies: Vec<Body>,
+    /// Of the scenario's objects, in their order.
+    pub(crate) models: Vec<Arc<ObjectModel>>,
     pub(crate) surfaces: Vec<(ColliderHandle, SurfaceSpec)>,
     pub(crate) contacts: Contacts,
     pub(crate) timings: SimTimings,
@@ -76,11 +82,14 @@ impl World {
             spec.surfaces.iter().map(|surface| (insert_surface(&mut physics, surface), surface.clone())).collect();
         let insert =
             |object: &Placed| Body::insert(&mut physics, object.clone(), spec.objects[object.spec].count.is_some());
-        let bodies: Vec<Body> = layout.objects.iter().map(insert).collect();
+        let mut bodies: Vec<Body> = layout.objects.iter().map(insert).collect();
         let camera = spec.cameras.first().map(|camera| camera.model.clone());
         let robot = gripper::description(spec.home, spec.workspace);
         let gripper = Gripper::build(&mut physics, &robot);
         let variables = state::names(scenario);
+        for body in &mut bodies {
+            body.set_shows(state::shows(&spec.objects[body.placed.spec], &variables));
+        }
         let layout_error = |source: LayoutError| SimError::Layout {
             scenario: scenario.name.clone(),
             seed: options.seed,
@@ -102,6 +111,7 @@ impl World {
             stopped: false,
             steps: 0,
             events,
+            models: spec.objects.iter().map(|object| object.model.clone()).collect(),
             surfaces,
             bodies,
             gripper,
@@ -115,8 +125,14 @@ impl World {
     fn settle(&mut self, seed: u64) -> Result<(), SimError> {
         let start: Vec<Pose> = self.bodies.iter().map(|body| body.pose(&self.physics)).collect();
         for _ in 0..(SETTLE_S / self.profile.step_s()).round() as u32 {
+            for body in &self.bodies {
+                body.act(&mut self.physics, &self.state);
+            }
             self.gripper.drive(&mut self.physics, &self.target, self.grip);
             self.physics.step();
+            for body in &mut self.bodies {
+                body.measure(&self.physics);
+            }
         }
         for (body, start) in self.bodies.iter_mut().zip(start) {
             let pose = body.pose(&self.physics);
@@ -126,6 +142,7 @@ impl World {
                 return Err(SimError::Unstable { object: name, seed, turn_deg: turn, shift_m: shift });
             }
             body.start = pose;
+            body.measure(&self.physics);
         }
         self.contacts.read(&self.physics, &self.gripper);
         self.refresh_state();
@@ -201,11 +218,14 @@ impl World {
         for event in &mut self.events {
             event.step(&mut self.physics, &mut self.bodies, &self.state, now_s);
         }
+        for body in &self.bodies {
+            body.act(&mut self.physics, &self.state);
+        }
         self.gripper.drive(&mut self.physics, target, self.grip);
         self.physics.step();
         self.steps += 1;
         for body in &mut self.bodies {
-            body.count_presses(&self.physics);
+            body.measure(&self.physics);
         }
         self.contacts.read(&self.physics, &self.gripper);
         self.forces.add(&self.contacts, self.gripper.wrist_force(&self.physics));

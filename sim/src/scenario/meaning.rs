@@ -8,7 +8,7 @@ use super::{
 };
 use crate::{
     gripper,
-    model::ModelLibrary,
+    model::{ModelLibrary, ObjectModel, is_name},
     oracle,
     random::{DrawKind, DrawSpec, StreamKind},
 };
@@ -21,6 +21,7 @@ use acm_concept::{
 };
 use acm_render::{Lighting, PointLight, Sun};
 use glam::{DMat3, DQuat, DVec3};
+use std::{path::Path, sync::Arc};
 
 const MAX_ITEMS: usize = 64;
 const MAX_ATTEMPTS: u32 = 100_000;
@@ -30,9 +31,7 @@ pub(super) fn parse(file: &str, text: &str) -> Result<Scenario, ScenarioError> {
     let raw: RawScenario = toml::from_str(text).map_err(|e| wrong(suggest(e.to_string())))?;
     let mut models = ModelLibrary::embedded()?;
     for model in &raw.model {
-        let problem = model.problem().map(|reason| ScenarioError::Model { file: file.into(), reason });
-        problem.map_or(Ok(()), Err)?;
-        models.add(model.clone());
+        models.add(model.meaning().map_err(|reason| ScenarioError::Model { file: file.into(), reason })?);
     }
     Meaning::new(file, &raw, models)?.scenario()
 }
@@ -40,7 +39,8 @@ pub(super) fn parse(file: &str, text: &str) -> Result<Scenario, ScenarioError> {
 struct Meaning<'a> {
     file: &'a str,
     raw: &'a RawScenario,
-    models: ModelLibrary,
+    /// Of every object, in their order.
+    models: Vec<Arc<ObjectModel>>,
     /// Draws of one value.
     scalars: Vec<String>,
     /// Draws of several values.
@@ -48,10 +48,14 @@ struct Meaning<'a> {
 }
 
 impl<'a> Meaning<'a> {
-    fn new(file: &'a str, raw: &'a RawScenario, models: ModelLibrary) -> Result<Self, ScenarioError> {
-        let mut meaning = Meaning { file, raw, models, scalars: Vec::new(), lists: Vec::new() };
+    fn new(file: &'a str, raw: &'a RawScenario, mut library: ModelLibrary) -> Result<Self, ScenarioError> {
+        let mut meaning = Meaning { file, raw, models: Vec::new(), scalars: Vec::new(), lists: Vec::new() };
         meaning.check_sizes()?;
         meaning.check_names()?;
+        for object in &raw.object {
+            let model = meaning.model(object, &mut library)?;
+            meaning.models.push(model);
+        }
         for draw in raw.random.iter().flat_map(|random| &random.draw) {
             let (name, is_list) = draw.name_and_shape();
             if is_list { meaning.lists.push(name.into()) } else { meaning.scalars.push(name.into()) }
@@ -61,7 +65,7 @@ impl<'a> Meaning<'a> {
 
     fn scenario(&self) -> Result<Scenario, ScenarioError> {
         let world = self.world()?;
-        let judge = self.judge(&world)?;
+        let judge = self.judge()?;
         Ok(Scenario {
             name: self.raw.scenario.clone(),
             summary: self.raw.summary.clone(),
@@ -279,11 +283,7 @@ impl<'a> Meaning<'a> {
     fn object(&self, at: usize) -> Result<ObjectSpec, ScenarioError> {
         let raw = &self.raw.object[at];
         let field = format!("object `{}`", raw.name);
-        let model = self.models.get(&raw.model).ok_or_else(|| {
-            let known = self.models.names().collect::<Vec<_>>().join(", ");
-            let hint = nearest(&raw.model, self.models.names());
-            self.wrong(&field, format!("there is no object model `{}`{hint}; known: {known}", raw.model))
-        })?;
+        let model = &self.models[at];
         let mut names = self.plain_names();
         if raw.count.is_some() {
             names.extend(self.lists.iter().map(String::as_str));
@@ -307,6 +307,9 @@ impl<'a> Meaning<'a> {
         Ok(ObjectSpec {
             name: raw.name.clone(),
             model: model.clone(),
+            fixed: raw.fixed.unwrap_or(model.fixed),
+            starts: self.starts(&field, raw, model, &names)?,
+            shows: self.shows(&field, raw, model)?,
             count: raw.count.as_ref().map(|count| self.number(&field, count, &self.plain_names())).transpose()?,
             position: self.triple(&field, raw.position.as_ref().unwrap_or(&origin), &names)?,
             yaw: self.number(&field, raw.yaw.as_ref().unwrap_or(&Number::Plain(0.0)), &names)?,
@@ -315,6 +318,59 @@ impl<'a> Meaning<'a> {
             hue_deg: raw.hue_deg.as_ref().map(|hue| self.number(&field, hue, &names)).transpose()?,
             perturb: raw.perturb,
         })
+    }
+
+    fn model(&self, raw: &RawObject, library: &mut ModelLibrary) -> Result<Arc<ObjectModel>, ScenarioError> {
+        let field = format!("object `{}`", raw.name);
+        match (&raw.model, &raw.model_file) {
+            (Some(name), None) => library.get(name).cloned().ok_or_else(|| {
+                let known = library.names().collect::<Vec<_>>().join(", ");
+                let hint = nearest(name, library.names());
+                self.wrong(&field, format!("there is no object model `{name}`{hint}; known: {known}"))
+            }),
+            (None, Some(file)) => {
+                let folder = Path::new(self.file).parent().unwrap_or(Path::new(""));
+                library.load(file, folder).map_err(|reason| self.wrong(format!("{field}.model_file"), reason))
+            }
+            _ => Err(self.wrong(field, "needs either `model` or `model_file`")),
+        }
+    }
+
+    fn starts(
+        &self,
+        field: &str,
+        raw: &RawObject,
+        model: &ObjectModel,
+        names: &[&str],
+    ) -> Result<Vec<(usize, Expression)>, ScenarioError> {
+        let known = || model.joints().map(|(link, _)| model.links[link].name.as_str());
+        let start = |(name, number): (&String, &Number)| {
+            let found = model.joints().find(|(link, _)| model.links[*link].name == *name);
+            let Some((link, _)) = found else {
+                let reason = format!("there is no joint `{name}`{}", nearest(name, known()));
+                return Err(self.wrong(format!("{field}.joints"), reason));
+            };
+            Ok((link, self.number(&format!("{field}.joints.{name}"), number, names)?))
+        };
+        raw.joints.iter().map(start).collect()
+    }
+
+    fn shows(
+        &self,
+        field: &str,
+        raw: &RawObject,
+        model: &ObjectModel,
+    ) -> Result<Vec<(String, Expression)>, ScenarioError> {
+        let known = self.judged_names();
+        let shown = |(name, text): (&String, &String)| {
+            if !model.shows().any(|(known, _)| known == name) {
+                let hint = nearest(name, model.shows().map(|(known, _)| known));
+                return Err(self.wrong(format!("{field}.shows"), format!("there is no lamp or gauge `{name}`{hint}")));
+            }
+            let expression = self.expression(&format!("{field}.shows.{name}"), text, &as_strs(&known))?;
+            Ok((name.clone(), expression))
+        };
+        raw.shows.iter().map(shown).collect()
     }
 
     fn place(&self, raw: &RawPlace) -> Result<PlaceSpec, ScenarioError> {
@@ -334,8 +390,7 @@ impl<'a> Meaning<'a> {
         self.within(&format!("{field}.over_s"), raw.over_s, 0.02, 600.0)?;
         self.within(&format!("{field}.lift_m"), raw.lift_m, 0.0, 2.0)?;
         let others = self.others();
-        let objects = self.raw.object.iter().map(|object| self.visible_to_judge(object));
-        let known = oracle::names(objects, &others);
+        let known = self.judged_names();
         let when = raw.when.as_ref().map(|text| self.expression(&field, text, &as_strs(&known))).transpose()?;
         let others = as_strs(&others);
         Ok(EventSpec {
@@ -368,14 +423,19 @@ impl<'a> Meaning<'a> {
         }
     }
 
-    fn judge(&self, world: &WorldSpec) -> Result<JudgeSpec, ScenarioError> {
+    fn judge(&self) -> Result<JudgeSpec, ScenarioError> {
         let raw = &self.raw.judge;
         for name in &raw.moves {
             self.known_object("judge.moves", name)?;
         }
-        let objects =
-            world.objects.iter().map(|o| (o.count.is_none().then_some(o.name.as_str()), o.model.button.is_some()));
-        let known = oracle::names(objects, &self.others());
+        // A draw may be called as an object's variable is and then hides it; two objects' variables may not.
+        let of_objects = self.names_with(&[]);
+        if let Some(twice) = of_objects.iter().enumerate().find(|(at, name)| of_objects[..*at].contains(name)) {
+            return Err(
+                self.wrong(format!("name `{}`", twice.1), "stands for two things; rename the object or the joint")
+            );
+        }
+        let known = self.judged_names();
         let known = as_strs(&known);
         Ok(JudgeSpec {
             moves: raw.moves.clone(),
@@ -424,10 +484,14 @@ impl<'a> Meaning<'a> {
         let index = raw.index.as_ref().map(|index| self.number(field, index, &self.plain_names())).transpose()?;
         Ok(Reference { object, index })
     }
-    /// An object's name if it has no copies, and whether it has a button.
-    fn visible_to_judge(&self, object: &'a RawObject) -> (Option<&'a str>, bool) {
-        let button = self.models.get(&object.model).is_some_and(|model| model.button.is_some());
-        (object.count.is_none().then_some(object.name.as_str()), button)
+    /// Names of all that the judge can know.
+    fn judged_names(&self) -> Vec<String> {
+        self.names_with(&self.others())
+    }
+    fn names_with(&self, others: &[String]) -> Vec<String> {
+        let named = |object: &'a RawObject| object.count.is_none().then_some(object.name.as_str());
+        let objects = self.raw.object.iter().zip(&self.models).map(|(object, model)| (named(object), &**model));
+        oracle::names(objects, others)
     }
     /// Constants that the judge can name: places and plain draws.
     fn others(&self) -> Vec<String> {
@@ -476,12 +540,6 @@ impl RawDraw {
             RawDraw::Permutation { name, .. } => (name, true),
         }
     }
-}
-
-fn is_name(name: &str) -> bool {
-    name.starts_with(|c: char| c.is_ascii_lowercase())
-        && name.len() <= 40
-        && name.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_')
 }
 
 fn as_strs(names: &[String]) -> Vec<&str> {

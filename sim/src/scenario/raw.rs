@@ -1,9 +1,10 @@
 //! The text of a scenario file, before its meaning is checked. The doc comments are the fields' documentation in
 //! the JSON schema.
 
-use crate::{model::ObjectModel, random::StreamKind};
+use crate::{model::RawModel, random::StreamKind};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// A number, or an expression over named draws such as `"0.1 + radius * cos(phase + TAU * i / n)"`.
 ///
@@ -67,7 +68,7 @@ pub(crate) struct RawScenario {
     pub(crate) random: Option<RawRandom>,
     /// Object models of this file alone, besides those that ship with the simulator.
     #[serde(default)]
-    pub(crate) model: Vec<ObjectModel>,
+    pub(crate) model: Vec<RawModel>,
     /// The objects.
     #[serde(default)]
     pub(crate) object: Vec<RawObject>,
@@ -299,8 +300,13 @@ pub(crate) struct RawReject {
 pub(crate) struct RawObject {
     /// Name: lower-case letters, digits and underscores, a letter first.
     pub(crate) name: String,
-    /// Name of its model.
-    pub(crate) model: String,
+    /// Its model: one that ships with the simulator, or one of this file. Either this or `model_file`.
+    #[serde(default)]
+    pub(crate) model: Option<String>,
+    /// A URDF or MJCF file instead: a path relative to this file, or `data:` and a path below the folder that the
+    /// variable `ACM_DATA` names. `#BODY` after an MJCF file takes one of its bodies.
+    #[serde(default)]
+    pub(crate) model_file: Option<String>,
     /// How many copies. In a copy's expressions `i` is its number from 0, `n` the count, and the name of a list of
     /// draws stands for the list's value at `i`.
     #[serde(default)]
@@ -317,6 +323,15 @@ pub(crate) struct RawObject {
     /// Factors by which sizes and places of its solids are stretched along its axes; angles stay. Default: 1.
     #[serde(default)]
     pub(crate) scale: Option<[Number; 3]>,
+    /// Positions of its joints at the start, by name, radians or metres. Default: the model's.
+    #[serde(default)]
+    pub(crate) joints: BTreeMap<String, Number>,
+    /// What its lamps and gauges show, by name: expressions over the judge's variables. Default: the model's.
+    #[serde(default)]
+    pub(crate) shows: BTreeMap<String, String>,
+    /// Whether its base stands still whatever touches it. Default: the model's.
+    #[serde(default)]
+    pub(crate) fixed: Option<bool>,
     /// Hue of its colours, degrees (0 red, 120 green, 240 blue), their saturation and brightness kept. Default: the
     /// model's own.
     #[serde(default)]
@@ -406,7 +421,10 @@ pub(crate) struct RawEvent {
 ///
 /// Variables: for every object without `count`: `NAME_x`, `NAME_y`, `NAME_z` (base frame, metres), `NAME_speed`
 /// (m/s), `NAME_spin` (rad/s), `NAME_tilt` (rad from upright), `NAME_moved` (metres from its start), `NAME_turned`
-/// (rad from its first heading), `NAME_touched` (pads in contact with it); for buttons `NAME_pressed` (1 or 0), `NAME_presses` (count), `NAME_depth` (metres);
+/// (rad from its first heading), `NAME_touched` (pads in contact with it); for each of its joints `NAME_JOINT`
+/// (position, rad or m), `NAME_JOINT_speed`, `NAME_JOINT_open` (0 closed to 1 wide open; 0 for one that turns without
+/// end), with a latch `NAME_JOINT_latched` (1 or 0), with a press counter `NAME_JOINT_pressed` (1 or 0) and
+/// `NAME_JOINT_presses` (count); of its first press counter also `NAME_pressed`, `NAME_presses`, `NAME_depth`;
 /// `PLACE_x`, `PLACE_y`, `PLACE_z`; `others_moved` (metres, the most that any object not listed in `moves` has
 /// moved); `commanded_opening` (share of the largest), `pad_contact` (pads in contact with anything, 0-2), `tcp_x`,
 /// `tcp_y`, `tcp_z`, `time` (seconds); plain draws under their names.

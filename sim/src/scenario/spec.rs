@@ -8,6 +8,7 @@ use crate::{
 use acm_concept::{camera::CameraModel, expression::Expression, task::Budgets};
 use acm_render::Lighting;
 use glam::DVec3;
+use std::sync::Arc;
 
 /// What the simulator builds.
 #[derive(Debug, Clone)]
@@ -60,7 +61,12 @@ pub(crate) enum RejectRule {
 #[derive(Debug, Clone)]
 pub(crate) struct ObjectSpec {
     pub(crate) name: String,
-    pub(crate) model: ObjectModel,
+    pub(crate) model: Arc<ObjectModel>,
+    pub(crate) fixed: bool,
+    /// Links, and where their joints start.
+    pub(crate) starts: Vec<(usize, Expression)>,
+    /// Lamps and gauges, and what they show instead of what the model says.
+    pub(crate) shows: Vec<(String, Expression)>,
     pub(crate) count: Option<Expression>,
     pub(crate) position: [Expression; 3],
     pub(crate) yaw: Expression,
