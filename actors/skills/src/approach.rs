@@ -17,7 +17,9 @@ const SPACING_M: f64 = 0.012;
 const MAX_SAMPLES: u32 = 24;
 /// Distance between the poses of a motion at which the room is looked at, metres; most of them.
 const STEP_M: f64 = 0.02;
-const MAX_STEPS: u32 = 40;
+const MAX_STEPS: u32 = 60;
+/// How far before the goal a way may come to it from, metres.
+const VIA_M: [f64; 2] = [0.15, 0.35];
 
 /// The TCP pose that acts at a frame: the approach direction goes against the frame's z axis, which points out of the
 /// part, and the fingers close along its y axis.
@@ -66,7 +68,20 @@ impl Surroundings {
         let length_m = from.translation.distance(to.translation) + 0.1 * from.angle_to(to);
         let steps = ((length_m / STEP_M).ceil() as u32).clamp(1, MAX_STEPS);
         let at = |step: u32| from.interpolate(to, f64::from(step) / f64::from(steps));
-        (0..=steps).map(|step| self.room_m(robot, &at(step), opening_m)).fold(FREE_M, f64::min)
+        let near = self.near(from.translation, to.translation, size_m(robot) + FREE_M);
+        (0..=steps).map(|step| near.room_m(robot, &at(step), opening_m)).fold(FREE_M, f64::min)
+    }
+    /// What of it comes within a distance of a line.
+    fn near(&self, from: DVec3, to: DVec3, distance_m: f64) -> Surroundings {
+        let along = to - from;
+        let nearest = |at: DVec3| {
+            let share = (at - from).dot(along) / along.length_squared().max(1e-12);
+            at.distance(from + share.clamp(0.0, 1.0) * along)
+        };
+        let is_near = |solid: &&PlacedSolid| {
+            nearest(solid.pose.translation) < distance_m + solid.solid.bounding_radius()
+        };
+        Surroundings { obstacles: self.obstacles.iter().filter(is_near).copied().collect(), floor_m: self.floor_m }
     }
     /// The height that clears everything.
     fn top_m(&self) -> f64 {
@@ -112,25 +127,47 @@ pub(crate) fn choose(
     }
 }
 
-/// A way through free space: straight if that is free, else up, across and down again; from the height that clears
-/// everything perceived, as far as the workspace has it.
+/// A way through free space: straight if that is free, else round by way of a place before the goal, or up, across and
+/// down; the first that is free, or the freest.
 pub(crate) fn way(hand: &Hand, to: Pose, around: &Surroundings, pace: Pace) -> Path {
     let (from, robot) = (hand.command.tcp, &hand.robot);
     let opening_m = hand.command.opening_m.max(0.5 * robot.max_opening_m);
-    if around.room_between_m(robot, &from, &to, opening_m) > 0.5 * SAFETY_M {
-        return Path::through(from, &[to], pace, robot.tick_s);
-    }
+    let inside = |pose: Pose| {
+        Pose::new(pose.translation.max(robot.workspace_min).min(robot.workspace_max), pose.rotation)
+    };
+    let before = VIA_M.map(|distance_m| inside(drawn_back(&to, distance_m)));
     let level_m = from.translation.z.max(to.translation.z);
-    let clear_m = around.top_m() + hand_radius_m(robot) + SAFETY_M;
-    for height_m in [level_m, level_m.max(0.5 * (level_m + clear_m))] {
-        let height_m = height_m.min(robot.workspace_max.z);
-        let corners = [Pose::new(from.translation.with_z(height_m), from.rotation), Pose::new(to.translation.with_z(height_m), to.rotation)];
-        let legs = [(from, corners[0]), (corners[0], corners[1]), (corners[1], to)];
-        if legs.iter().all(|(a, b)| around.room_between_m(robot, a, b, opening_m) > 0.0) {
-            return Path::through(from, &[corners[0], corners[1], to], pace, robot.tick_s);
+    let clear_m = (around.top_m() + hand_radius_m(robot) + SAFETY_M).max(level_m);
+    let over = |goal: Pose, height_m: f64| {
+        let at = |pose: Pose| inside(Pose::new(pose.translation.with_z(height_m), pose.rotation));
+        [Pose::new(at(from).translation, from.rotation), at(goal), goal]
+    };
+    let mut ways = vec![vec![to]];
+    ways.extend(before.map(|via| vec![via, to]));
+    for height_m in [level_m, clear_m] {
+        ways.push(over(to, height_m).to_vec());
+        ways.extend(before.map(|via| [over(via, height_m).as_slice(), &[to]].concat()));
+    }
+    let mut best: Option<(f64, Vec<Pose>)> = None;
+    for corners in ways {
+        let starts = std::iter::once(&from).chain(&corners);
+        let room = |(a, b): (&Pose, &Pose)| around.room_between_m(robot, a, b, opening_m);
+        let room_m = starts.zip(&corners).map(room).fold(FREE_M, f64::min);
+        if room_m > 0.5 * SAFETY_M {
+            return Path::through(from, &corners, pace, robot.tick_s);
+        }
+        if best.as_ref().is_none_or(|(best_m, _)| room_m > *best_m) {
+            best = Some((room_m, corners));
         }
     }
-    Path::over(from, to, clear_m.max(level_m).min(robot.workspace_max.z), pace, robot.tick_s)
+    let corners = best.map_or_else(|| vec![to], |(_, corners)| corners);
+    Path::through(from, &corners, pace, robot.tick_s)
+}
+
+/// Radius of the ball round the whole hand about the TCP, metres.
+fn size_m(robot: &RobotDescription) -> f64 {
+    let solids = robot.solids(&Pose::IDENTITY, robot.max_opening_m);
+    solids.iter().map(|part| part.pose.translation.length() + part.solid.bounding_radius()).fold(0.0, f64::max)
 }
 
 /// World points on all faces of a solid.

@@ -103,8 +103,8 @@ pub enum StartError {
         /// The function kind.
         kind: String,
     },
-    /// The hand would have to tilt, which these controllers cannot.
-    #[error("to put it there the hand would have to tilt by {:.0} degrees; it only works pointing down", tilt_rad.to_degrees())]
+    /// The hand would have to come from where it cannot.
+    #[error("for that the hand would have to tilt by {:.0} degrees from pointing down; take it in another way", tilt_rad.to_degrees())]
     Tilted {
         /// Angle between the approach direction and straight down, radians.
         tilt_rad: f64,

@@ -44,7 +44,7 @@ impl Flip {
         let height_m = argument(invocation, "height")?;
         let out = invocation.frame.transform_vector(DVec3::Z);
         if out.z.abs() > 0.1 {
-            return Err(StartError::Tilted { tilt_rad: out.z.asin().abs() });
+            return Err(StartError::Tilted { tilt_rad: out.angle_between(DVec3::Z) });
         }
         // Upside down the hand is as far over the support as it now is below the thing's top.
         let grip_m = invocation.frame.translation.z - invocation.support_height_m;

@@ -30,7 +30,20 @@ pub struct Rig {
 }
 
 /// The text of a scenario whose world is a table, the given models and objects, and a robot with a roomy workspace.
-pub fn scenario(models: &str, objects: &str, table_friction: f64) -> String {
+pub fn scenario(models: &str, objects: &str, friction: f64) -> String {
+    let low = DVec3::new(-1.4, -1.4, TABLE_M + 0.003);
+    scenario_on(models, objects, friction, TABLE_M, DVec3::new(0.0, 0.0, 1.3), [low, DVec3::new(1.4, 1.4, 2.2)])
+}
+
+/// As [`scenario`], on a ground of another height, with the hand's home and the corners of its workspace.
+pub fn scenario_on(
+    models: &str,
+    objects: &str,
+    friction: f64,
+    ground_m: f64,
+    home: DVec3,
+    [low, high]: [DVec3; 2],
+) -> String {
     format!(
         r##"scenario = "rig"
 summary = "a world for one try of a skill"
@@ -41,11 +54,11 @@ seconds = 1000.0
 skills = 100
 frames = 1
 [[surface]]
-name = "table"
-size = [3.0, 3.0, 0.05]
-position = [0.0, 0.0, {center}]
+name = "ground"
+size = [6.0, 6.0, 0.05]
+position = [0.0, 0.0, {}]
 color = "#ffffff"
-friction = {table_friction}
+friction = {friction}
 support = true
 [[camera]]
 name = "none"
@@ -54,16 +67,15 @@ forward = [0.0, 0.6, -0.8]
 left = [-1.0, 0.0, 0.0]
 fov_y_deg = 50.0
 [robot]
-home = [0.0, 0.0, 1.3]
-workspace = [[-1.4, -1.4, {floor}], [1.4, 1.4, 2.2]]
+home = {home}
+workspace = [{low}, {high}]
 [[judge.strict.stage]]
 name = "never"
 when = "time > 1000000"
 {models}
 {objects}
 "##,
-        center = TABLE_M - 0.025,
-        floor = TABLE_M + 0.003,
+        ground_m - 0.025,
     )
 }
 
