@@ -86,6 +86,8 @@ impl Articulation {
         match *self {
             Articulation::Prismatic { direction } => {
                 let way = *last - *first;
+                // The part may have gone either way.
+                let way = if way.dot(direction) < 0.0 { -way } else { way };
                 let weight = (way.length() * LINE_SIGMA_RAD / TRACE_SIGMA_M).powi(2);
                 let mean = (direction + weight * way.normalize_or(direction)).normalize_or(direction);
                 Articulation::Prismatic { direction: mean }

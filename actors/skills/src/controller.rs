@@ -119,7 +119,10 @@ const KINDS: &[(&str, Start)] = &[
     ("flip", |i, h, f| Ok(run(i, Sequence::new(flip::Flip::plan(i, &h, f)?), h))),
     ("grasp-along", |i, h, f| Ok(run(i, Sequence::new(grasp_along::GraspAlong::plan(i, &h, f)?), h))),
     ("grasp-from-above", |i, h, f| Ok(run(i, grasp_from_above::GraspFromAbove::plan(i, &h, f)?, h))),
-    ("hinge-close", |i, h, _| Ok(run(i, Sequence::new(hinge_close::plan(i, &h)?), h))),
+    ("hinge-close", |i, h, _| match i.arguments.contains_key("grip_width") {
+        true => Ok(run(i, Sequence::new(hinge_close::draw(i, &h)?), h)),
+        false => Ok(run(i, Sequence::new(hinge_close::push(i, &h)?), h)),
+    }),
     ("hinge-open", |i, h, _| Ok(run(i, Sequence::new(hinge_open::plan(i, &h)?), h))),
     ("insert-along", |i, h, f| Ok(run(i, Sequence::new(insert_along::InsertAlong::plan(i, &h, f)?), h))),
     ("move-to", |i, h, _| Ok(run(i, Sequence::new(move_to::plan(i, &h)?), h))),
@@ -131,7 +134,10 @@ const KINDS: &[(&str, Start)] = &[
     ("reach", |i, h, _| Ok(run(i, Sequence::new(reach::Reach::plan(i, &h)?), h))),
     ("release", |i, h, _| Ok(run(i, Sequence::new(release::Release::plan(i)?), h))),
     ("rotate", |i, h, _| Ok(run(i, Sequence::new(rotate::plan(i, &h)?), h))),
-    ("slide-close", |i, h, _| Ok(run(i, Sequence::new(slide_close::plan(i, &h)?), h))),
+    ("slide-close", |i, h, _| match i.arguments.contains_key("grip_width") {
+        true => Ok(run(i, Sequence::new(slide_close::draw(i, &h)?), h)),
+        false => Ok(run(i, Sequence::new(slide_close::push(i, &h)?), h)),
+    }),
     ("slide-open", |i, h, _| Ok(run(i, Sequence::new(slide_open::plan(i, &h)?), h))),
     ("turn", |i, h, _| Ok(run(i, Sequence::new(turn::plan(i, &h)?), h))),
 ];

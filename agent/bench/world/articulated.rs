@@ -9,7 +9,7 @@ use acm_concept::{
     pose::Pose,
     solid::{PlacedSolid, Solid},
 };
-use acm_sim::{TrueJoint, TrueLink, TrueObject};
+use acm_sim::{TrueJoint, TrueLink, TrueObject, TruePiece};
 use anyhow::{Context, Result};
 use glam::{DMat3, DQuat, DVec2, DVec3};
 use std::path::{Path, PathBuf};
@@ -20,10 +20,15 @@ pub const OPEN_SHARE: f64 = 0.75;
 const FARTHER_SHARE: f64 = 0.04;
 /// Open by no more than this share counts as shut.
 pub const SHUT_SHARE: f64 = 0.05;
+/// A front that looks down by more than this share cannot be pushed from outside.
+const BELOW: f64 = 0.25;
 /// A door's or drawer's front is at least so wide and high, metres; it goes at least so far, radians or metres.
 const FRONT_M: f64 = 0.07;
 const LEAST_TURN_RAD: f64 = 0.7;
 const LEAST_SLIDE_M: f64 = 0.08;
+/// Shortest handle along the fingers' width, and how near pieces of one handle are, metres.
+const NARROWEST_M: f64 = 0.006;
+const TOUCHING_M: f64 = 0.002;
 /// Widest handle, metres.
 const WIDEST_M: f64 = 0.068;
 /// Pieces whose front is this near to the foremost one are handles, if they stand out from the front by so much; metres.
@@ -34,10 +39,11 @@ const FOOTPRINT_M: f64 = 0.014;
 /// Half of the palm's sides, metres; and how far the fingers reach beyond it.
 const PALM_M: DVec2 = DVec2::new(0.108, 0.038);
 const FINGERS_M: f64 = 0.04;
-/// The height on which small things stand, metres: the hand must get under their handles.
-const PLINTH_M: f64 = 0.7;
-/// What is higher than this stands on the ground, metres.
+/// The height of things that are not tall, metres: the hand must get under their handles.
+const RAISED_M: f64 = 0.7;
+/// What is higher than this stands near the ground, metres: some doors reach below their foot.
 const TALL_M: f64 = 0.75;
+const GROUND_M: f64 = 0.05;
 
 /// The models whose doors and drawers are tried.
 const OWN: [&str; 7] = [
@@ -110,9 +116,9 @@ pub fn models(data: Option<&Path>) -> Vec<String> {
 /// # Errors
 /// The world cannot be built.
 pub fn run_model(model: &str) -> Result<Vec<Swing>> {
-    let plain = Rig::new(&world(model, 0.0, DVec3::ONE), 0)?.object("thing")?;
-    let height_m = if plain.size_m.z > TALL_M { 0.0 } else { PLINTH_M };
-    let text = world(model, height_m, plain.size_m);
+    let plain = Rig::new(&world(model, 0.0), 0)?.object("thing")?;
+    let height_m = if plain.size_m.z > TALL_M { GROUND_M } else { RAISED_M };
+    let text = world(model, height_m);
     let thing = Rig::new(&text, 0)?.object("thing")?;
     let fronts: Vec<Front> = (0..thing.links.len()).filter_map(|link| Front::of(&thing, link)).collect();
     let outer = fronts.iter().filter(|front| !fronts.iter().any(|other| other.hides(front)));
@@ -140,7 +146,7 @@ fn swing(model: &str, text: &str, thing: &TrueObject, front: &Front) -> Result<S
         return Ok(result);
     }
     rig.go_home()?;
-    let shut = shut(&mut rig, front);
+    let shut = shut(&mut rig, thing, front);
     rig.wait(0.5)?;
     let joint = now(&rig, front)?;
     (result.left, result.most_n) = (joint.opened, rig.most_n);
@@ -156,6 +162,7 @@ fn now(rig: &Rig, front: &Front) -> Result<TrueJoint> {
 
 fn open(rig: &mut Rig, thing: &TrueObject, front: &Front) -> Result<(), String> {
     let (frame, width_m) = front.handle().ok_or("it has no handle that the hand can take")?;
+    let handles = front.handles(thing);
     let travel = (OPEN_SHARE + FARTHER_SHARE) * front.way;
     let mut arguments = front.joint_in(&frame);
     arguments.push(("grip_width", width_m));
@@ -163,35 +170,48 @@ fn open(rig: &mut Rig, thing: &TrueObject, front: &Front) -> Result<(), String> 
     let kind = if front.is_hinge { "hinge-open" } else { "slide-open" };
     let mut skill = invocation(kind, THING, thing.pose, frame, &arguments);
     skill.support_height_m = 0.0;
-    skill.obstacles = solids(thing, |link| carrier(thing, link) != front.link);
+    skill.obstacles = solids(thing, |link, piece| !handles.contains(&(link, piece)));
     rig.done(&skill).map(|_| ())
 }
 
-fn shut(rig: &mut Rig, front: &Front) -> Result<(), String> {
+fn shut(rig: &mut Rig, shut_thing: &TrueObject, front: &Front) -> Result<(), String> {
     let thing = rig.object("thing").map_err(|error| error.to_string())?;
     let link = thing.links.get(front.link).ok_or("the part is gone")?;
     let joint = link.joint.as_ref().ok_or("the part has lost its joint")?;
-    let flat = front.flat().ok_or("its front has no flat that the hand can press")?;
-    let frame = link.pose * front.closed.inverse() * flat;
+    let handles = front.handles(shut_thing);
+    let turned = link.pose * front.closed.inverse();
     let travel = (joint.position - joint.closed).abs();
-    let mut arguments = front.joint_in(&flat);
+    // Pushed shut from outside, unless outside is below, or it slides sideways: then drawn by its handle.
+    let below = turned.transform_vector(front.axes.z_axis).z < -BELOW;
+    let sideways = !front.is_hinge && front.axis.dot(front.axes.z_axis).abs() < 0.5;
+    let (taken, width_m) = if below || sideways {
+        let (frame, width_m) = front.handle().ok_or("it has no handle that the hand can take")?;
+        (frame, Some(width_m))
+    } else {
+        (front.flat().ok_or("its front has no flat that the hand can press")?, None)
+    };
+    let mut arguments = front.joint_in(&taken);
     arguments.push((if front.is_hinge { "angle" } else { "travel" }, travel));
+    arguments.extend(width_m.map(|width_m| ("grip_width", width_m)));
     let kind = if front.is_hinge { "hinge-close" } else { "slide-close" };
-    let mut skill = invocation(kind, THING, thing.pose, frame, &arguments);
+    let mut skill = invocation(kind, THING, thing.pose, turned * taken, &arguments);
     skill.support_height_m = 0.0;
-    skill.obstacles = solids(&thing, |_| true);
+    skill.obstacles = solids(&thing, |link, piece| width_m.is_none() || !handles.contains(&(link, piece)));
     rig.done(&skill).map(|_| ())
 }
 
 /// The boxes round the pieces of some links, as the hand is told of what is in its way. They belong to another object
 /// than the one it acts on, so that they count.
-fn solids(thing: &TrueObject, wanted: impl Fn(usize) -> bool) -> Vec<(ObjectId, PlacedSolid)> {
-    let links = thing.links.iter().enumerate().filter(|(at, _)| wanted(*at));
-    let solid = |(pose, low, high): (Pose, DVec3, DVec3)| {
-        let pose = pose * Pose::from_translation(0.5 * (low + high));
-        (ObjectId(2), PlacedSolid { solid: Solid::Box { size: high - low }, pose })
+fn solids(thing: &TrueObject, wanted: impl Fn(usize, usize) -> bool) -> Vec<(ObjectId, PlacedSolid)> {
+    let solid = |link: &TrueLink, piece: &TruePiece| {
+        let pose = link.pose * Pose::from_translation(0.5 * (piece.low + piece.high));
+        (ObjectId(2), PlacedSolid { solid: Solid::Box { size: piece.high - piece.low }, pose })
     };
-    links.flat_map(|(_, link)| link.pieces.iter().map(|piece| solid((link.pose, piece.low, piece.high)))).collect()
+    let pieces = |(at, link): (usize, &TrueLink)| -> Vec<(ObjectId, PlacedSolid)> {
+        let counts = link.pieces.iter().enumerate().filter(|(index, _)| wanted(at, *index));
+        counts.map(|(_, piece)| solid(link, piece)).collect()
+    };
+    thing.links.iter().enumerate().flat_map(pieces).collect()
 }
 
 /// A box, aligned with the thing's axes when all is shut, in coordinates along right, up and out of a front.
@@ -207,6 +227,10 @@ impl Piece {
     }
     fn middle(&self) -> DVec3 {
         0.5 * (self.low + self.high)
+    }
+    fn touches(&self, other: &Piece) -> bool {
+        let apart = (self.low - other.high).max(other.low - self.high);
+        apart.max_element() < TOUCHING_M
     }
     fn covers(&self, right: f64, up: f64) -> bool {
         (self.low.x..=self.high.x).contains(&right) && (self.low.y..=self.high.y).contains(&up)
@@ -269,6 +293,7 @@ impl Front {
         (size.x.min(size.y) >= FRONT_M).then_some(front)
     }
 
+
     fn bounds(&self) -> Piece {
         let start = Piece { low: DVec3::MAX, high: DVec3::MIN };
         self.pieces.iter().fold(start, |all, piece| Piece { low: all.low.min(piece.low), high: all.high.max(piece.high) })
@@ -294,28 +319,62 @@ impl Front {
         (at - self.origin).reject_from_normalized(self.axis).length()
     }
 
-    /// The frame in which the handle is taken, and its width.
+    /// The boxes of what stands out from the front: pieces that touch each other together make a handle.
+    fn standing_out(&self) -> Vec<Piece> {
+        let panel = self.panel();
+        let out = self.pieces.iter().filter(|piece| piece.high.z > panel + STANDS_OUT_M);
+        let mut boxes: Vec<Piece> = Vec::new();
+        for piece in out {
+            let mut joined = *piece;
+            // Boxes that the new one touches become one with it.
+            let (touched, apart): (Vec<Piece>, Vec<Piece>) = boxes.into_iter().partition(|other| joined.touches(other));
+            for other in touched {
+                joined = Piece { low: joined.low.min(other.low), high: joined.high.max(other.high) };
+            }
+            boxes = apart;
+            boxes.push(joined);
+        }
+        boxes
+    }
+
+    /// The frame in which the handle is taken, and its width: a piece of it that is alone narrow enough, like the bar
+    /// between its feet, or all of it together, like a shell of many pieces.
     fn handle(&self) -> Option<(Pose, f64)> {
         let foremost = self.bounds().high.z;
         let panel = self.panel();
-        let graspable = |piece: &&Piece| {
+        let graspable = |piece: &Piece| {
             let size = piece.size();
             piece.high.z > foremost - FOREMOST_M
                 && piece.high.z > panel + STANDS_OUT_M
                 && size.x.min(size.y) < WIDEST_M
+                && size.x.max(size.y) > NARROWEST_M
         };
-        let merit = |piece: &&Piece| {
+        let merit = |piece: &Piece| {
             let (size, middle) = (piece.size(), piece.middle());
             // Of pieces that are alike, the longer: the bar, not its feet.
             size.x.max(size.y) + 0.2 * self.merit(middle.x, middle.y)
         };
-        let best = self.pieces.iter().filter(graspable).max_by(|a, b| merit(a).total_cmp(&merit(b)))?;
+        let whole = self.standing_out();
+        let candidates = if whole.iter().any(graspable) { whole } else { self.pieces.clone() };
+        let best = candidates.into_iter().filter(graspable).max_by(|a, b| merit(a).total_cmp(&merit(b)))?;
         let (size, middle) = (best.size(), best.middle());
         let deep = (0.5 * size.z).min(0.015).min(best.high.z - panel - 0.014).max(0.003);
         let at = self.axes * DVec3::new(middle.x, middle.y, best.high.z - deep);
         // The fingers close across its narrow side.
         let across = if size.x <= size.y { self.axes.x_axis } else { self.axes.y_axis };
         Some((framed(at, across, self.axes.z_axis), size.x.min(size.y)))
+    }
+
+    /// The pieces of the shut thing that stand out from this front: link and number.
+    fn handles(&self, thing: &TrueObject) -> Vec<(usize, usize)> {
+        let panel = self.panel();
+        let own = thing.links.iter().enumerate().filter(|(at, _)| carrier(thing, *at) == self.link);
+        let stands_out = |(at, link): (usize, &TrueLink)| -> Vec<(usize, usize)> {
+            let pieces = link.pieces.iter().enumerate();
+            let out = pieces.filter(|(_, piece)| seen(&link.pose, piece.low, piece.high, &self.axes).high.z > panel + STANDS_OUT_M);
+            out.map(|(index, _)| (at, index)).collect()
+        };
+        own.flat_map(stands_out).collect()
     }
 
     /// How far out the front's largest piece reaches.
@@ -423,16 +482,9 @@ fn framed(at: DVec3, y: DVec3, z: DVec3) -> Pose {
     Pose::new(at, DQuat::from_mat3(&DMat3::from_cols(y.cross(z), y, z)).normalize())
 }
 
-/// A world with one thing in it: on the ground, or on a plinth that is smaller than its foot.
-fn world(model: &str, height_m: f64, size: DVec3) -> String {
-    let mut objects = format!("[[object]]\nname = \"thing\"\nmodel = \"{model}\"\nposition = [0, 0, {height_m}]\n");
-    if height_m > 0.0 {
-        objects = format!(
-            "[[surface]]\nname = \"plinth\"\nsize = [{}, {}, {height_m}]\nposition = [0, 0, {}]\ncolor = \"#808080\"\nsupport = true\n{objects}",
-            0.9 * size.x,
-            0.9 * size.y,
-            0.5 * height_m
-        );
-    }
+/// A world with one thing in it. It hangs at its height, as if in a kitchen's wall: some doors reach below their foot.
+fn world(model: &str, height_m: f64) -> String {
+    let field = if model.starts_with("data:") { "model_file" } else { "model" };
+    let objects = format!("[[object]]\nname = \"thing\"\n{field} = \"{model}\"\nposition = [0, 0, {height_m}]\n");
     rig::scenario_on("", &objects, 0.5, 0.0, DVec3::new(1.3, 0.0, 1.3), [DVec3::new(-2.5, -2.5, 0.004), DVec3::new(2.5, 2.5, 3.0)])
 }

@@ -129,6 +129,7 @@ pub(crate) struct Draw {
     opening_m: f64,
     grasp: GraspPlan,
     follow: FollowPlan,
+    must_stop: bool,
 }
 
 /// What tells the kinds of drawing apart.
@@ -140,6 +141,8 @@ pub(crate) struct DrawKind {
     pub travel: f64,
     /// Whether the part hangs on something.
     pub attached: bool,
+    /// Whether the way ends at a stop.
+    pub to_stop: bool,
     pub felt: Felt,
 }
 
@@ -174,12 +177,13 @@ impl Draw {
             follow: FollowPlan {
                 kind: kind.primitive,
                 joint: kind.joint,
-                travel: kind.travel,
+                travel: kind.travel + kind.travel.signum() * beyond(&kind.joint, kind.to_stop),
                 least,
                 speed_m_s: PULL_M_S,
                 // Replaced by a watch of the gap that the grasp finds.
                 hold: Hold::Contact,
             },
+            must_stop: kind.to_stop,
         })
     }
 
@@ -208,6 +212,7 @@ impl Steps for Draw {
         Draw::reach,
         Draw::grasp,
         Draw::follow,
+        |draw, moment| judge_stop(moment, draw.must_stop),
         |draw, moment| note_travel(moment, draw.object, draw.felt),
         |_, moment| Some(ending::back_off_by(moment.hand, LEAVE_M)),
         |draw, moment| ending::felt_free(moment, draw.object),
@@ -272,11 +277,7 @@ impl Drive {
             Articulation::Prismatic { .. } => 1.0,
             Articulation::Revolute { .. } => kind.joint.lever_m(contact.translation).max(0.02),
         };
-        let beyond = match (kind.to_stop, kind.joint) {
-            (false, _) => 0.0,
-            (true, Articulation::Prismatic { .. }) => BEYOND_M,
-            (true, Articulation::Revolute { .. }) => BEYOND_RAD,
-        };
+        let beyond = beyond(&kind.joint, kind.to_stop);
         let whole = kind.travel.abs() + RUN_UP_M / lever;
         let least = whole - LACK.max(LACK_SHARE * kind.travel.abs());
         Ok(Drive {
@@ -325,15 +326,6 @@ impl Drive {
     fn follow(&mut self, moment: &mut Moment<'_>) -> Option<Next> {
         Some(Next::begin(Follow::new(moment.hand, self.follow.clone())))
     }
-
-    fn judge(&mut self, moment: &mut Moment<'_>) -> Option<Next> {
-        if let Some(Outcome::Followed { stopped: false, .. }) = moment.last
-            && self.must_stop
-        {
-            return Some(Next::fail(FailureCause::Press, "pushed beyond where it should shut, but nothing stopped it"));
-        }
-        note_travel(moment, self.object, self.felt)
-    }
 }
 
 impl Steps for Drive {
@@ -341,7 +333,8 @@ impl Steps for Drive {
         Drive::reach,
         Drive::close_in,
         Drive::follow,
-        Drive::judge,
+        |drive, moment| judge_stop(moment, drive.must_stop),
+        |drive, moment| note_travel(moment, drive.object, drive.felt),
         |_, moment| Some(ending::back_off_by(moment.hand, LEAVE_M)),
     ];
     fn way_out(&self) -> WayOut {
@@ -350,6 +343,22 @@ impl Steps for Drive {
     fn object(&self) -> ObjectId {
         self.object
     }
+}
+
+/// How far beyond its believed end a way is followed that ends at a stop.
+fn beyond(joint: &Articulation, to_stop: bool) -> f64 {
+    match (to_stop, joint) {
+        (false, _) => 0.0,
+        (true, Articulation::Prismatic { .. }) => BEYOND_M,
+        (true, Articulation::Revolute { .. }) => BEYOND_RAD,
+    }
+}
+
+/// What should have been stopped and was not is not shut.
+fn judge_stop(moment: &Moment<'_>, must_stop: bool) -> Option<Next> {
+    let free = matches!(moment.last, Some(Outcome::Followed { stopped: false, .. }));
+    let reason = "moved beyond where it should shut, but nothing stopped it";
+    (must_stop && free).then(|| Next::fail(FailureCause::Press, reason))
 }
 
 /// Of a pose and the same with the fingers exchanged, the one that needs the smaller turn of the hand.

@@ -20,6 +20,7 @@ pub(crate) fn plan(invocation: &SkillInvocation, hand: &Hand) -> Result<Draw, St
         joint: joint(invocation, DVec3::X),
         travel: argument(invocation, "travel")?,
         attached: false,
+        to_stop: false,
         felt: Felt::Nothing,
     };
     Draw::plan(invocation, hand, kind)

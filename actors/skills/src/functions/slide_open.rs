@@ -20,6 +20,7 @@ pub(crate) fn plan(invocation: &SkillInvocation, hand: &Hand) -> Result<Draw, St
         joint: joint(invocation, DVec3::Z),
         travel: argument(invocation, "travel")?,
         attached: true,
+        to_stop: false,
         felt: Felt::Open,
     };
     Draw::plan(invocation, hand, kind)

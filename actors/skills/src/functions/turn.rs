@@ -22,6 +22,7 @@ pub(crate) fn plan(invocation: &SkillInvocation, hand: &Hand) -> Result<Draw, St
         joint: Articulation::Revolute { point: invocation.frame.translation, axis },
         travel: argument(invocation, "angle")?.copysign(number(invocation, "sense", 1.0)),
         attached: true,
+        to_stop: false,
         felt: Felt::Nothing,
     };
     Draw::plan(invocation, hand, kind)

@@ -113,7 +113,8 @@ impl Grasp {
     fn close(&mut self, hand: &mut Hand, feedback: &Feedback) -> Step {
         let Phase::Close { gaps, one_sided_ticks } = &mut self.phase else { return Step::Act };
         let gap_m = feedback.opening_m;
-        if gap_m < CLOSED_M {
+        // A thin handle is narrower than what counts as closed fingers elsewhere.
+        if gap_m < CLOSED_M.min(0.5 * self.plan.width_m) {
             return Step::Failed(nothing(format!("the fingers closed on nothing: the gap is {:.1} mm", 1e3 * gap_m)));
         }
         hand.command.grip_force_n = CLOSING_N.min(hand.robot.max_grip_force_n);
@@ -187,7 +188,7 @@ impl Primitive for Grasp {
                     follow_part(hand);
                 }
                 let (gap_m, width_m) = (feedback.opening_m, *width_m);
-                if gap_m < CLOSED_M {
+                if gap_m < CLOSED_M.min(0.5 * width_m) {
                     return Step::Failed(nothing("the object slipped out when it was squeezed".into()));
                 }
                 if gaps.reached(hand, gap_m) {

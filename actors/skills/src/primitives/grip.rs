@@ -51,7 +51,7 @@ impl GripWatch {
             let reason = format!("the object was lost on the way: {how} (gap {before:.1} mm before, {now:.1} mm now)");
             Err(Failure::empty_handed(FailureCause::Grasp, reason))
         };
-        if gap_m < CLOSED_M {
+        if gap_m < CLOSED_M.min(0.5 * self.gap_m) {
             return lost("the fingers closed");
         }
         let pads = pads_in_contact(feedback);
