@@ -14,6 +14,7 @@ use acm_concept::{
     camera::{CameraError, CameraModel, CameraSource, FrameHeader, Intrinsics, MAX_PIXELS, RgbdFrame},
     embodiment::{Clock, Command, Embodiment, EmbodimentError, Feedback, RobotDescription},
     ids::FrameId,
+    plane::Plane,
     task::TaskSpec,
     time::Time,
 };
@@ -37,7 +38,7 @@ pub type SharedRenderer = Arc<Mutex<Renderer>>;
 /// let simulation = Simulation::without_renderer(&scenario, &SimOptions::default())?;
 /// let mut robot = simulation.embodiment();
 /// let here = robot.feedback();
-/// let command = acm_concept::embodiment::Command { tcp: here.tcp, opening_m: 0.08, grip_force_n: 20.0 };
+/// let command = acm_concept::embodiment::Command::hand(here.tcp, 0.08, 20.0);
 /// assert!((robot.command(&command)?.time.seconds() - 0.02).abs() < 1e-9);
 /// assert!(!simulation.verdict().strict);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -75,7 +76,7 @@ impl Simulation {
     pub fn without_renderer(scenario: &Scenario, options: &SimOptions) -> Result<Simulation, SimError> {
         let world = World::new(scenario, options)?;
         let cameras = cameras(scenario, options)?;
-        let stage = Stage::new(&world, &scenario.world.lighting)?;
+        let stage = Stage::new(&world)?;
         Ok(Simulation {
             shared: Arc::new(Mutex::new(world)),
             task: scenario.task.clone(),
@@ -92,13 +93,14 @@ impl Simulation {
             instruction: self.task.instruction.clone(),
             instruction_at_s: self.task.instruction_at_s,
             budgets: self.task.budgets,
+            then: self.task.then.clone(),
             cameras: self.cameras.iter().map(|camera| camera.nominal.clone()).collect(),
         }
     }
 
     /// The robot.
     pub fn embodiment(&self) -> Box<dyn Embodiment> {
-        let robot = self.world().robot.clone();
+        let robot = self.world().robot.description.clone();
         Box::new(Robot { shared: self.shared.clone(), robot })
     }
 
@@ -113,6 +115,7 @@ impl Simulation {
             stage: self.stage.clone(),
             renderer: self.renderer.clone(),
             noise,
+            shown: vec![None; self.cameras.len()],
             next: 0,
         })
     }
@@ -165,6 +168,12 @@ impl Simulation {
         world.bodies.iter().map(of).collect()
     }
 
+    /// The judge's variables as they are now, by name. For analysing failures; never for the agent.
+    pub fn variables(&self) -> Vec<(String, f64)> {
+        let world = self.world();
+        world.variables.iter().cloned().zip(world.state.iter().copied()).collect()
+    }
+
     /// Processor time taken so far.
     pub fn timings(&self) -> SimTimings {
         self.world().timings
@@ -182,10 +191,12 @@ impl Simulation {
     pub fn preview(&self, camera: Option<&str>) -> Result<Preview, SimError> {
         let renderer = self.renderer.as_ref().ok_or(SimError::NoRenderer)?;
         let world = self.world();
-        let found = self.cameras.iter().find(|c| camera.is_none_or(|name| c.nominal.name == name));
-        let camera = found.ok_or_else(|| SimError::NoCamera { name: camera.unwrap_or_default().into() })?;
+        let mut cameras = self.cameras.iter().enumerate();
+        let found = cameras.find(|(_, c)| camera.is_none_or(|name| c.nominal.name == name));
+        let (at, camera) = found.ok_or_else(|| SimError::NoCamera { name: camera.unwrap_or_default().into() })?;
         let mut renderer = lock(renderer);
-        let rendered = renderer.render(&self.stage.scene(&world), &camera.nominal)?;
+        let mut rendered = renderer.render(&self.stage.scene(&world), &world.placed(&camera.nominal))?;
+        expose(&mut rendered.color, world.exposures.get(at).copied().unwrap_or(1.0));
         let color = image::RgbImage::from_raw(rendered.width, rendered.height, rendered.color).unwrap_or_default();
         Ok(Preview { color, ids: rendered.ids, legend: Ids::of(&world).legend(&world) })
     }
@@ -265,7 +276,16 @@ struct Cameras {
     stage: Arc<Stage>,
     renderer: Option<SharedRenderer>,
     noise: ChaCha8Rng,
+    /// What each camera showed last.
+    shown: Vec<Option<Picture>>,
     next: u64,
+}
+
+/// Colour and depth of a frame.
+#[derive(Clone)]
+struct Picture {
+    color: Plane<u8>,
+    depth: Plane<f32>,
 }
 
 impl CameraSource for Cameras {
@@ -282,28 +302,48 @@ impl CameraSource for Cameras {
         let renderer = self.renderer.as_ref().ok_or_else(|| failed("the simulation has no renderer".into()))?;
         let mut world = lock(&self.shared);
         let pixels = found.nominal.intrinsics.pixels();
-        let (color, depth) = if world.is_covered(at) {
-            (vec![0; 3 * pixels], vec![0.0; pixels])
+        let stuck = if world.is_frozen(at) { self.shown.get(at).cloned().flatten() } else { None };
+        let picture = if let Some(stuck) = stuck {
+            stuck
+        } else if world.is_covered(at) {
+            Picture { color: vec![0; 3 * pixels].into(), depth: vec![0.0; pixels].into() }
         } else {
             let started = cpu_s(ClockId::ProcessCPUTime);
             let scene = self.stage.scene(&world);
-            let truth = found.sensor.true_camera(&found.nominal);
-            let rendered = lock(renderer).render(&scene, &truth).map_err(|e| failed(e.to_string()))?;
+            let truth = world.placed(&found.sensor.true_camera(&found.nominal));
+            let mut rendered = lock(renderer).render(&scene, &truth).map_err(|e| failed(e.to_string()))?;
             world.timings.render_s += cpu_s(ClockId::ProcessCPUTime) - started;
             let started = cpu_s(ClockId::ThreadCPUTime);
+            expose(&mut rendered.color, world.exposures.get(at).copied().unwrap_or(1.0));
             let measured = found.sensor.measure(&rendered, &truth, &mut self.noise);
             world.timings.noise_s += cpu_s(ClockId::ThreadCPUTime) - started;
-            (measured.color, measured.depth)
+            Picture { color: measured.color.into(), depth: measured.depth.into() }
         };
         let header = FrameHeader {
             id: FrameId(self.next),
             camera: camera.into(),
             time: world.now(),
             intrinsics: found.nominal.intrinsics,
-            camera_pose: found.nominal.pose,
+            camera_pose: world.placed(&found.nominal).pose,
         };
         self.next += 1;
-        RgbdFrame::new(header, color.into(), depth.into()).map_err(|e| failed(e.to_string()))
+        if let Some(shown) = self.shown.get_mut(at) {
+            *shown = Some(picture.clone());
+        }
+        RgbdFrame::new(header, picture.color, picture.depth).map_err(|e| failed(e.to_string()))
+    }
+}
+
+/// Brightens or darkens 8-bit sRGB colours as a longer or shorter exposure would.
+fn expose(color: &mut [u8], exposure: f64) {
+    if exposure == 1.0 {
+        return;
+    }
+    // sRGB is near enough to a power of 2.2 of the light.
+    let gain = exposure.powf(1.0 / 2.2);
+    let table: [u8; 256] = std::array::from_fn(|value| (value as f64 * gain).round().min(255.0) as u8);
+    for value in color {
+        *value = table[usize::from(*value)];
     }
 }
 

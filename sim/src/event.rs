@@ -1,5 +1,5 @@
-//! What third parties do: they carry objects from place to place, whether a camera sees it or not, and stand before
-//! cameras.
+//! What third parties do: they carry objects from place to place, whether a camera sees it or not, stand before
+//! cameras, and stop them.
 
 use crate::{
     body::Body,
@@ -26,6 +26,7 @@ pub(crate) struct Event {
 enum Deed {
     Carry { body: usize, to: Pose, lift_m: f64 },
     Cover { cameras: Vec<usize> },
+    Freeze { cameras: Vec<usize> },
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -51,6 +52,7 @@ pub(crate) fn build(spec: &WorldSpec, layout: &Layout, variables: &[String]) -> 
                 Deed::Carry { body, to, lift_m: *lift_m }
             }
             DeedSpec::Cover { cameras } => Deed::Cover { cameras: cameras.clone() },
+            DeedSpec::Freeze { cameras } => Deed::Freeze { cameras: cameras.clone() },
         };
         let when = event.when.as_ref().map(|when| Watch::new(when, variables));
         Ok(Event { when, after_s: event.after_s, over_s: event.over_s, deed, phase: Phase::Waiting })
@@ -79,6 +81,11 @@ impl Event {
     pub(crate) fn covers(&self, camera: usize) -> bool {
         let covered = matches!(&self.deed, Deed::Cover { cameras } if cameras.contains(&camera));
         covered && matches!(self.phase, Phase::Acting(..))
+    }
+    /// Whether a camera is stuck at its last picture now.
+    pub(crate) fn freezes(&self, camera: usize) -> bool {
+        let frozen = matches!(&self.deed, Deed::Freeze { cameras } if cameras.contains(&camera));
+        frozen && matches!(self.phase, Phase::Acting(..))
     }
 }
 

@@ -7,8 +7,10 @@
 //! |---|---|
 //! | `scenario`, `model` | scenario files and object models: raw text to checked meaning |
 //! | `random`, `layout`, `placed` | seeded draws, start layouts, rejection, how one copy is made |
-//! | `world`, `body`, `articulation`, `gripper`, `contact` | the running physics: objects, their joints, the hand, what it feels |
-//! | `event`, `slip` | what third parties do, and an injected mishap |
+//! | `world`, `body`, `articulation`, `contact` | the running physics: objects, their joints, what the pads touch |
+//! | `robot` | robots as data: arms, wrists, hands, their limits and what they feel |
+//! | `event`, `mishap` | what third parties do, and mishaps with what is carried |
+//! | `fluent` | regions, named quantities and the rules that change them |
 //! | `oracle`, `state` | the judge and its variables |
 //! | `episode`, `scene`, `truth`, `report` | the handles, the picture, the truth, what is reported |
 //!
@@ -23,19 +25,20 @@ mod episode;
 mod event;
 #[cfg(test)]
 mod expert;
-mod gripper;
+mod fluent;
 mod layout;
+mod mishap;
 mod model;
 mod oracle;
 mod placed;
 mod profile;
 mod random;
 mod report;
+mod robot;
 mod scenario;
 mod scene;
 #[cfg(test)]
 mod shared_data;
-mod slip;
 mod state;
 #[cfg(test)]
 mod testbed;
@@ -44,9 +47,11 @@ mod world;
 
 pub use episode::{SharedRenderer, Simulation};
 pub use layout::LayoutError;
+pub use mishap::MishapKind;
 pub use oracle::OracleVerdict;
 pub use profile::PhysicsProfile;
 pub use random::DrawError;
 pub use report::{Preview, SimError, SimOptions, SimTimings};
-pub use scenario::{MAX_SCENARIO_BYTES, Scenario, ScenarioError};
+pub use robot::RobotError;
+pub use scenario::{MAX_SCENARIO_BYTES, Scenario, ScenarioError, Setting};
 pub use truth::{TrueJoint, TrueLink, TrueObject, TruePiece, TrueShape};

@@ -63,15 +63,15 @@ impl Watch {
         let slots = expression.names().into_iter().filter_map(slot).collect();
         Some(Watch { expression, slots })
     }
-    /// Its value; `None` outside of the domain.
-    pub(crate) fn value(&self, state: &[f64]) -> Option<f64> {
-        let values: Vec<(&str, f64)> = self.values(state).collect();
-        self.expression.evaluate(&values).ok().filter(|value| value.is_finite())
-    }
     /// Whether it holds. The parser has checked the names, so a failed evaluation is a number out of its domain,
     /// and does not hold.
     pub(crate) fn holds(&self, state: &[f64]) -> bool {
         self.value(state).is_some_and(|value| value != 0.0)
+    }
+    /// Its value, if it is a finite number.
+    pub(crate) fn value(&self, state: &[f64]) -> Option<f64> {
+        let values: Vec<(&str, f64)> = self.values(state).collect();
+        self.expression.evaluate(&values).ok().filter(|value| value.is_finite())
     }
     fn values<'a>(&'a self, state: &'a [f64]) -> impl Iterator<Item = (&'a str, f64)> {
         self.slots.iter().map(|(name, slot)| (name.as_str(), state.get(*slot).copied().unwrap_or(f64::NAN)))

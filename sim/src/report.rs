@@ -12,6 +12,8 @@ pub struct SimOptions {
     pub seed: u64,
     /// During this carry, counted from 1, the object is taken out of the hand unseen and set down 5-12 cm away.
     pub slip_at: Option<u32>,
+    /// During this carry, counted from 1, the fingers open for a moment and the object falls.
+    pub drop_at: Option<u32>,
     /// Sensor profile of all cameras instead of the scenario's.
     pub sensor: Option<String>,
     /// Whether the robot may move.
@@ -22,7 +24,7 @@ pub struct SimOptions {
 
 impl Default for SimOptions {
     fn default() -> Self {
-        SimOptions { seed: 0, slip_at: None, sensor: None, motion: true, camera_size: None }
+        SimOptions { seed: 0, slip_at: None, drop_at: None, sensor: None, motion: true, camera_size: None }
     }
 }
 

@@ -6,7 +6,7 @@ use crate::{
     world::World,
 };
 use acm_concept::{pose::Pose, solid::Solid};
-use acm_render::{Instance, Lighting, Material, Mesh, MeshError, Scene};
+use acm_render::{Instance, Material, Mesh, MeshError, Scene};
 use glam::{DVec3, Vec3};
 use std::sync::Arc;
 
@@ -14,10 +14,9 @@ const BACKGROUND: [u8; 3] = [200, 200, 205];
 const HAND_COLOR: [u8; 3] = [235, 235, 235];
 const FINGER_COLOR: [u8; 3] = [60, 60, 66];
 
-/// Meshes and constant parts of a world's scene.
+/// Meshes of a world's scene.
 #[derive(Debug)]
 pub(crate) struct Stage {
-    lighting: Lighting,
     cuboid: Arc<Mesh>,
     cylinder: Arc<Mesh>,
     ball: Arc<Mesh>,
@@ -26,7 +25,7 @@ pub(crate) struct Stage {
 }
 
 impl Stage {
-    pub(crate) fn new(world: &World, lighting: &Lighting) -> Result<Stage, MeshError> {
+    pub(crate) fn new(world: &World) -> Result<Stage, MeshError> {
         let mut bevelled = Vec::new();
         for (object, body) in world.bodies.iter().enumerate() {
             for (link, piece, at) in pieces(body.placed.links.iter().map(|link| &link.pieces)) {
@@ -36,12 +35,12 @@ impl Stage {
             }
         }
         let (cuboid, cylinder) = (Arc::new(Mesh::unit_box()), Arc::new(Mesh::unit_cylinder()));
-        Ok(Stage { lighting: lighting.clone(), cuboid, cylinder, ball: Arc::new(unit_ball()?), bevelled })
+        Ok(Stage { cuboid, cylinder, ball: Arc::new(unit_ball()?), bevelled })
     }
 
     /// The scene as the world stands now.
     pub(crate) fn scene(&self, world: &World) -> Scene {
-        let mut scene = Scene { instances: Vec::new(), lights: self.lighting.clone(), background: BACKGROUND };
+        let mut scene = Scene { instances: Vec::new(), lights: world.lighting.clone(), background: BACKGROUND };
         let ids = Ids::of(world);
         for (index, (_, surface)) in world.surfaces.iter().enumerate() {
             let solid = Solid::Box { size: surface.size };
@@ -58,20 +57,14 @@ impl Stage {
                 }
             }
         }
-        self.add_hand(world, &mut scene, ids.hand());
+        self.add_robot(world, &mut scene, ids.hand());
         scene
     }
 
-    fn add_hand(&self, world: &World, scene: &mut Scene, id: u32) {
-        let tcp = world.gripper.tcp(&world.physics);
-        for part in &world.robot.hand {
-            scene.instances.push(self.instance(&part.solid, tcp * part.pose, HAND_COLOR, id));
-        }
-        let mirror = Pose::from_yaw(DVec3::ZERO, std::f64::consts::PI);
-        for (frame, turn) in world.gripper.finger_poses(&world.physics).into_iter().zip([Pose::IDENTITY, mirror]) {
-            for part in &world.robot.finger {
-                scene.instances.push(self.instance(&part.solid, frame * turn * part.pose, FINGER_COLOR, id));
-            }
+    fn add_robot(&self, world: &World, scene: &mut Scene, id: u32) {
+        for (part, is_finger) in world.robot.seen(&world.physics) {
+            let color = if is_finger { FINGER_COLOR } else { HAND_COLOR };
+            scene.instances.push(self.instance(&part.solid, part.pose, color, id));
         }
     }
 

@@ -1,6 +1,7 @@
 //! The judge's variables and their values.
 
 use crate::{
+    fluent,
     layout::Layout,
     oracle::{self, Watch},
     scenario::{ObjectSpec, Scenario, WorldSpec},
@@ -13,7 +14,11 @@ pub(crate) fn names(scenario: &Scenario) -> Vec<String> {
     let objects = spec.objects.iter().map(|o| (o.count.is_none().then_some(o.name.as_str()), &*o.model));
     let places = spec.places.iter().flat_map(|place| ["x", "y", "z"].map(|axis| format!("{}_{axis}", place.name)));
     let scalars = spec.draws.iter().filter(|draw| draw.count.is_none()).map(|draw| draw.name.clone());
-    oracle::names(objects, &places.chain(scalars).collect::<Vec<_>>())
+    let mut names = oracle::names(objects, &places.chain(scalars).collect::<Vec<_>>());
+    let single: Vec<&str> = spec.objects.iter().filter(|o| o.count.is_none()).map(|o| o.name.as_str()).collect();
+    let regions = spec.regions.iter().map(|region| region.name.as_str());
+    names.extend(fluent::names(regions, spec.fluents.iter().map(|fluent| fluent.name.as_str()), &single));
+    names
 }
 
 /// Values of places and plain draws.
@@ -27,20 +32,21 @@ pub(crate) fn constants(spec: &WorldSpec, layout: &Layout) -> Vec<f64> {
 /// Writes the values of all variables.
 pub(crate) fn fill(world: &World, values: &mut Vec<f64>) {
     let physics = &world.physics;
-    let tcp = world.gripper.tcp(physics).translation;
+    let tcp = world.robot.tcp(physics).translation;
     let moved = |index: &usize| {
         let body = &world.bodies[*index];
         body.pose(physics).translation.distance(body.start.translation)
     };
     values.clear();
     values.push(world.bystanders.iter().map(moved).fold(0.0, f64::max));
-    values.push(world.grip.opening_m / world.robot.max_opening_m);
+    values.push(world.robot.commanded_opening());
     values.push(world.contacts.pads_in_contact() as f64);
     values.extend([tcp.x, tcp.y, tcp.z, world.seconds()]);
     values.extend(&world.constants);
     for body in world.bodies.iter().filter(|body| !body.is_copy) {
         body.values(physics, &world.contacts, values);
     }
+    world.fluents.fill(world, values);
 }
 
 /// What an object's lamps and gauges show. Copies have no variables of their own, so that theirs show only what the

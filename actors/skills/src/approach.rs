@@ -154,14 +154,14 @@ pub(crate) fn way(hand: &Hand, to: Pose, around: &Surroundings, pace: Pace) -> P
         let room = |(a, b): (&Pose, &Pose)| around.room_between_m(robot, a, b, opening_m);
         let room_m = starts.zip(&corners).map(room).fold(FREE_M, f64::min);
         if room_m > 0.5 * SAFETY_M {
-            return Path::through(from, &corners, pace, robot.tick_s);
+            return Path::through(from, &corners, pace, robot.tick_s).freely();
         }
         if best.as_ref().is_none_or(|(best_m, _)| room_m > *best_m) {
             best = Some((room_m, corners));
         }
     }
     let corners = best.map_or_else(|| vec![to], |(_, corners)| corners);
-    Path::through(from, &corners, pace, robot.tick_s)
+    Path::through(from, &corners, pace, robot.tick_s).freely()
 }
 
 /// Radius of the ball round the whole hand about the TCP, metres.

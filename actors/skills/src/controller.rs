@@ -1,6 +1,7 @@
 //! What a controller is, how one is started, and why one cannot be.
 
 use crate::{
+    arm::choice::choose,
     functions::*,
     hand::Hand,
     run::{Function, Run},
@@ -118,7 +119,11 @@ type Start = fn(&SkillInvocation, Hand, &Feedback) -> Result<Box<dyn Controller>
 const KINDS: &[(&str, Start)] = &[
     ("flip", |i, h, f| Ok(run(i, Sequence::new(flip::Flip::plan(i, &h, f)?), h))),
     ("grasp-along", |i, h, f| Ok(run(i, Sequence::new(grasp_along::GraspAlong::plan(i, &h, f)?), h))),
-    ("grasp-from-above", |i, h, f| Ok(run(i, grasp_from_above::GraspFromAbove::plan(i, &h, f)?, h))),
+    // What a hand does to take a part from above depends on the hand.
+    ("grasp-from-above", |i, h, f| match h.robot.suction.is_some() {
+        true => Ok(run(i, suck_from_above::SuckFromAbove::plan(i, &h, f)?, h)),
+        false => Ok(run(i, grasp_from_above::GraspFromAbove::plan(i, &h, f)?, h)),
+    }),
     ("hinge-close", |i, h, _| match i.arguments.contains_key("grip_width") {
         true => Ok(run(i, Sequence::new(hinge_close::draw(i, &h)?), h)),
         false => Ok(run(i, Sequence::new(hinge_close::push(i, &h)?), h)),
@@ -161,5 +166,7 @@ pub fn start(
     let Some((_, start)) = KINDS.iter().find(|(kind, _)| *kind == invocation.kind) else {
         return Err(StartError::UnknownKind { kind: invocation.kind.clone(), known: kinds().join(", ") });
     };
-    start(invocation, Hand::new(robot, feedback), feedback)
+    let arm = choose(invocation, robot, feedback);
+    let hand = Hand::for_skill(invocation, robot, feedback, arm);
+    start(invocation, hand, feedback.of_arm(arm).unwrap_or(feedback))
 }

@@ -153,7 +153,13 @@ impl<F: Function> Run<F> {
                     running.primitive.tick(&mut self.hand, feedback)
                 };
                 match step {
-                    Step::Act => return Tick::Act(self.hand.command()),
+                    Step::Act => {
+                        let command = self.hand.command();
+                        match self.hand.fault() {
+                            Some(reason) => return self.fail(feedback, Failure::new(FailureCause::Motion, reason)),
+                            None => return Tick::Act(command),
+                        }
+                    }
                     Step::Done(outcome) => {
                         self.close_primitive(feedback, None);
                         last = Some(outcome);
@@ -186,6 +192,7 @@ impl<F: Function> Run<F> {
     fn fail(&mut self, feedback: &Feedback, failure: Failure) -> Tick {
         self.close_primitive(feedback, Some(failure.reason.clone()));
         if failure.empty_handed {
+            self.hand.command.vacuum = false;
             self.notes.feel_empty(self.function.object());
         }
         self.failure = Some((failure.cause, failure.reason));
@@ -206,7 +213,8 @@ impl<F: Function> Run<F> {
             hand.command.opening_m = hand.command.opening_m.max(feedback.opening_m.min(hand.robot.max_opening_m));
             *ticks = ticks.saturating_sub(1);
             if !hand.turn_opening(*target_m, OPENING_M_S) && *ticks > 0 {
-                return Tick::Act(hand.command());
+                let command = hand.command();
+                return if hand.fault().is_none() { Tick::Act(command) } else { self.finish(feedback) };
             }
             withdrawal.opening = None;
         }
@@ -223,13 +231,9 @@ impl<F: Function> Run<F> {
                 Path::through(from, &[Pose::new(inside, from.rotation)], Pace::carrying(robot), robot.tick_s)
             }
         });
-        match path.advance() {
-            Some(next) => {
-                self.hand.command.tcp = next;
-                Tick::Act(self.hand.command())
-            }
-            None => self.finish(feedback),
-        }
+        let flying = self.hand.follow(path);
+        let command = self.hand.command();
+        if flying && self.hand.fault().is_none() { Tick::Act(command) } else { self.finish(feedback) }
     }
 
     fn finish(&mut self, feedback: &Feedback) -> Tick {
@@ -255,6 +259,8 @@ impl<F: Function> Controller for Run<F> {
             return Tick::Finished(report.clone());
         }
         self.started.get_or_insert(feedback.time);
+        // At first another arm may have been the last to move.
+        let feedback = feedback.of_arm(self.hand.command.arm).unwrap_or(feedback);
         self.hand.observe(feedback);
         if self.withdrawal.is_some() { self.withdraw(feedback) } else { self.advance(feedback) }
     }

@@ -2,11 +2,16 @@
 
 use super::raw::{Color, RawPerturb};
 use crate::{
+    mishap::MishapKind,
     model::ObjectModel,
     random::{DrawSpec, StreamKind},
+    robot::RobotModel,
 };
-use acm_concept::{camera::CameraModel, expression::Expression, task::Budgets};
-use acm_render::Lighting;
+use acm_concept::{
+    camera::CameraModel,
+    expression::Expression,
+    task::{Budgets, Further},
+};
 use glam::DVec3;
 use std::sync::Arc;
 
@@ -14,10 +19,10 @@ use std::sync::Arc;
 #[derive(Debug, Clone)]
 pub(crate) struct WorldSpec {
     pub(crate) surfaces: Vec<SurfaceSpec>,
-    pub(crate) lighting: Lighting,
+    /// `None` for the usual lights.
+    pub(crate) lighting: Option<LightSpec>,
     pub(crate) cameras: Vec<CameraSpec>,
-    pub(crate) home: DVec3,
-    pub(crate) workspace: [DVec3; 2],
+    pub(crate) robot: RobotModel,
     pub(crate) stream: StreamKind,
     pub(crate) attempts: u32,
     pub(crate) draws: Vec<DrawSpec>,
@@ -25,6 +30,44 @@ pub(crate) struct WorldSpec {
     pub(crate) objects: Vec<ObjectSpec>,
     pub(crate) places: Vec<PlaceSpec>,
     pub(crate) events: Vec<EventSpec>,
+    pub(crate) regions: Vec<RegionSpec>,
+    pub(crate) fluents: Vec<FluentSpec>,
+    pub(crate) rules: Vec<RuleSpec>,
+    pub(crate) mishaps: Vec<(MishapKind, u32)>,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct LightSpec {
+    pub(crate) ambient: Expression,
+    pub(crate) sun_direction: [Expression; 3],
+    pub(crate) sun: Expression,
+    /// Position and strength.
+    pub(crate) points: Vec<([Expression; 3], Expression)>,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct RegionSpec {
+    pub(crate) name: String,
+    pub(crate) of: Option<Reference>,
+    pub(crate) low: [Expression; 3],
+    pub(crate) high: [Expression; 3],
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct FluentSpec {
+    pub(crate) name: String,
+    pub(crate) start: Expression,
+    /// Over all variables, per second.
+    pub(crate) rate: Option<Expression>,
+    pub(crate) low: f64,
+    pub(crate) high: f64,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct RuleSpec {
+    pub(crate) when: Expression,
+    /// Index of the fluent and its new value.
+    pub(crate) set: Vec<(usize, Expression)>,
 }
 
 #[derive(Debug, Clone)]
@@ -42,6 +85,7 @@ pub(crate) struct CameraSpec {
     /// Nominal calibration.
     pub(crate) model: CameraModel,
     pub(crate) sensor: String,
+    pub(crate) exposure: Expression,
 }
 
 #[derive(Debug, Clone)]
@@ -118,6 +162,10 @@ pub(crate) enum DeedSpec {
     Cover {
         cameras: Vec<usize>,
     },
+    /// Indices of the cameras.
+    Freeze {
+        cameras: Vec<usize>,
+    },
 }
 
 /// What the judge decides.
@@ -156,4 +204,5 @@ pub(crate) struct TaskTemplate {
     pub(crate) instruction: String,
     pub(crate) instruction_at_s: f64,
     pub(crate) budgets: Budgets,
+    pub(crate) then: Vec<Further>,
 }

@@ -21,6 +21,7 @@ pub(crate) mod release;
 pub(crate) mod rotate;
 pub(crate) mod slide_close;
 pub(crate) mod slide_open;
+pub(crate) mod suck_from_above;
 pub(crate) mod turn;
 
 use crate::{

@@ -8,6 +8,7 @@ mod insert;
 mod press;
 mod reach;
 mod release;
+mod suck;
 
 pub(crate) use carry::{Carry, Lower};
 pub(crate) use follow::{Follow, FollowPlan, Hold};
@@ -17,6 +18,7 @@ pub(crate) use insert::{Insert, InsertPlan};
 pub(crate) use press::{Press, PressPlan};
 pub(crate) use reach::Reach;
 pub(crate) use release::Release;
+pub(crate) use suck::Suck;
 
 use crate::{articulation::Articulation, hand::Hand};
 use acm_concept::{embodiment::Feedback, pose::Pose, primitive::Primitive as Kind, skill::FailureCause};

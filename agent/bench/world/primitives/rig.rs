@@ -157,6 +157,7 @@ pub fn invocation(kind: &str, object: ObjectId, base: Pose, frame: Pose, argumen
         obstacles: Vec::<(ObjectId, PlacedSolid)>::new(),
         support_height_m: TABLE_M,
         held: None,
+        held_solids: vec![],
         attempt: 0,
     }
 }

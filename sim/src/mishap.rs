@@ -1,10 +1,12 @@
-//! An injected mishap: an object is taken out of the hand unseen and set down somewhere near.
+//! Mishaps with what the hand carries: it is gone and stands somewhere near, or the fingers let it fall.
 
 use crate::{body::Body, event::put, layout::gap, placed::solids_at, world::World};
 use acm_concept::{camera::CameraModel, pose::Pose};
 use glam::{DVec2, DVec3};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
 /// An object that is this much higher than where the pads took it is carried, metres.
@@ -22,9 +24,23 @@ const BORDER: f64 = 30.0 / 640.0;
 /// Places tried in one physics step; the next step tries again from where the hand is then.
 const TRIES: u32 = 64;
 
+/// How long the hand lets go in a drop, seconds.
+const DROP_S: f64 = 0.3;
+
+/// What goes wrong with what the hand carries.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum MishapKind {
+    /// It is taken out of the hand unseen and set down 5 to 12 cm away.
+    Slip,
+    /// The fingers open for 0.3 s, and it falls.
+    Drop,
+}
+
 /// Watches what the hand carries and strikes once, during the given carry.
 #[derive(Debug, Clone)]
-pub(crate) struct Slip {
+pub(crate) struct Mishap {
+    kind: MishapKind,
     /// Counted from 1.
     at_carry: u32,
     rng: ChaCha8Rng,
@@ -32,6 +48,8 @@ pub(crate) struct Slip {
     carries: u32,
     gripped: Option<Gripped>,
     done: bool,
+    /// Until when a drop holds the fingers open, seconds.
+    open_until_s: f64,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -42,12 +60,12 @@ struct Gripped {
     counted: bool,
 }
 
-impl Slip {
-    pub(crate) fn new(at_carry: u32, seed: u64, camera: Option<CameraModel>) -> Slip {
+impl Mishap {
+    pub(crate) fn new(kind: MishapKind, at_carry: u32, seed: u64, camera: Option<CameraModel>) -> Mishap {
         // A stream of its own: the mishap changes nothing else.
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(2);
-        Slip { at_carry, rng, camera, carries: 0, gripped: None, done: false }
+        Mishap { kind, at_carry, rng, camera, carries: 0, gripped: None, done: false, open_until_s: 0.0 }
     }
 
     /// Looks at the world after a physics step.
@@ -76,8 +94,17 @@ impl Slip {
         }
     }
 
+    /// Whether the hand lets go now, whatever it was told.
+    pub(crate) fn drops(&self, world: &World) -> bool {
+        world.seconds() < self.open_until_s
+    }
+
     fn strike(&mut self, world: &mut World) {
         let Some(gripped) = self.gripped else { return };
+        if self.kind == MishapKind::Drop {
+            (self.open_until_s, self.done) = (world.seconds() + DROP_S, true);
+            return;
+        }
         for _ in 0..TRIES {
             let pose = self.candidate(world, &world.bodies[gripped.body]);
             if let Some(pose) = pose.filter(|pose| self.is_free(world, gripped.body, pose)) {
@@ -118,6 +145,6 @@ impl Slip {
             let there = solids_at(&other.placed, &other.pose(&world.physics));
             gap(&here, &there).is_ok_and(|gap| gap >= CLEARANCE_M)
         });
-        seen && clear && world.robot.reaches(centre)
+        seen && clear && world.robot.description.reaches(centre)
     }
 }
