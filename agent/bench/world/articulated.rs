@@ -4,6 +4,10 @@
 //! axis of its hinge. Everything else is the function kinds' own.
 
 use super::primitives::rig::{self, Rig, invocation};
+use crate::{
+    bench::{BenchResult, Row},
+    cli::BenchArgs,
+};
 use acm_concept::{
     ids::ObjectId,
     pose::Pose,
@@ -55,8 +59,42 @@ const OWN: [&str; 7] = [
     "two-door-refrigerator",
     "washing-machine",
 ];
-/// The same of the shared data.
+/// How the names of the shared data's models begin; and their categories.
+const SHARED_PREFIX: &str = "data:infinigen_articulated/";
 const SHARED: [&str; 5] = ["microwave", "refrigerator", "cabinet", "drawer", "oven"];
+
+/// The variable that names the folder of the shared data.
+const DATA: &str = "ACM_DATA";
+
+/// Opens and shuts every outer door and drawer of our models and of the shared data, and lists them.
+///
+/// # Errors
+/// A world cannot be built.
+pub fn measure(args: &BenchArgs, result: &mut BenchResult) -> Result<()> {
+    let data = std::env::var_os(DATA).map(PathBuf::from);
+    let (mut tried, mut good) = (0usize, 0usize);
+    let mut models = models(data.as_deref());
+    models.truncate(args.episodes.unwrap_or(usize::MAX));
+    for model in &models {
+        let shared = model.starts_with(SHARED_PREFIX);
+        for swing in run_model(model)? {
+            tried += usize::from(shared);
+            good += usize::from(shared && swing.good());
+            let values =
+                [("opened", swing.opened), ("left", swing.left), ("most_n", swing.most_n), ("good", f64::from(u8::from(swing.good())))];
+            let group = if shared { "articulated" } else { "articulated, own" };
+            result.rows.push(Row { group: Some(group.into()), ..Row::new(swing.name.as_str(), values) });
+            result.notes.extend(swing.failure.map(|why| format!("{}: {why}", swing.name)));
+        }
+    }
+    if data.is_none() {
+        let reason = format!("no data: name the folder of the shared data in {DATA}");
+        result.rows.push(Row::skipped("articulated, shared", reason));
+    } else if tried > 0 {
+        result.figure("articulated_open75_success", good as f64 / tried as f64);
+    }
+    Ok(())
+}
 
 /// One door or drawer, opened and shut.
 #[derive(Debug, Clone, PartialEq)]
@@ -106,7 +144,7 @@ pub fn models(data: Option<&Path>) -> Vec<String> {
             .collect();
         seeds.sort();
         let seeds = seeds.iter().filter_map(|path| path.file_name().and_then(|name| name.to_str()));
-        names.extend(seeds.map(|seed| format!("data:infinigen_articulated/{category}/{seed}/{category}.urdf")));
+        names.extend(seeds.map(|seed| format!("{SHARED_PREFIX}{category}/{seed}/{category}.urdf")));
     }
     names
 }
@@ -129,7 +167,7 @@ fn swing(model: &str, text: &str, thing: &TrueObject, front: &Front) -> Result<S
     let link = &thing.links[front.link];
     let mut rig = Rig::new(text, 0)?;
     let mut result = Swing {
-        name: format!("{} / {}", model.trim_start_matches("data:infinigen_articulated/"), link.name),
+        name: format!("{} / {}", model.trim_start_matches(SHARED_PREFIX), link.name),
         is_hinge: front.is_hinge,
         way: front.way,
         opened: 0.0,
@@ -163,7 +201,10 @@ fn now(rig: &Rig, front: &Front) -> Result<TrueJoint> {
 fn open(rig: &mut Rig, thing: &TrueObject, front: &Front) -> Result<(), String> {
     let (frame, width_m) = front.handle().ok_or("it has no handle that the hand can take")?;
     let handles = front.handles(thing);
-    let travel = (OPEN_SHARE + FARTHER_SHARE) * front.way;
+    // What falls open by its weight is led to its end: let go half way, it would fall on the hand.
+    let falls = front.is_hinge && front.axis.z.abs() < 0.5;
+    let share = if falls { 1.0 } else { OPEN_SHARE + FARTHER_SHARE };
+    let travel = share * front.way;
     let mut arguments = front.joint_in(&frame);
     arguments.push(("grip_width", width_m));
     arguments.push((if front.is_hinge { "angle" } else { "travel" }, travel));
@@ -487,4 +528,19 @@ fn world(model: &str, height_m: f64) -> String {
     let field = if model.starts_with("data:") { "model_file" } else { "model" };
     let objects = format!("[[object]]\nname = \"thing\"\n{field} = \"{model}\"\nposition = [0, 0, {height_m}]\n");
     rig::scenario_on("", &objects, 0.5, 0.0, DVec3::new(1.3, 0.0, 1.3), [DVec3::new(-2.5, -2.5, 0.004), DVec3::new(2.5, 2.5, 3.0)])
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+    use super::*;
+
+    #[test]
+    fn our_own_doors_and_drawers_open_and_shut() {
+        let swings: Vec<Swing> = models(None).iter().flat_map(|model| run_model(model).unwrap()).collect();
+        assert!(swings.len() >= 10, "{} doors and drawers", swings.len());
+        for swing in swings {
+            assert!(swing.good(), "{}", swing.line());
+        }
+    }
 }

@@ -4,11 +4,53 @@ pub mod rig;
 pub mod table;
 pub mod trial;
 
+use crate::{
+    bench::{BenchResult, Row},
+    cli::BenchArgs,
+};
 use acm_concept::primitive::Primitive;
 use anyhow::Result;
 use std::collections::BTreeMap;
 use table::{Cell, Table};
 use trial::Trial;
+
+/// Seeds of a cell, and of one where it is only to be seen that it works.
+const SEEDS: u64 = 40;
+const QUICK_SEEDS: u64 = 4;
+/// Most reasons that are told of a cell.
+const REASONS: usize = 3;
+
+/// Runs the whole table.
+///
+/// # Errors
+/// The table is malformed, or a world cannot be built.
+pub fn measure(args: &BenchArgs, result: &mut BenchResult) -> Result<()> {
+    let table = Table::own()?;
+    let seeds = args.episodes.map_or(if args.quick { QUICK_SEEDS } else { SEEDS }, |episodes| episodes as u64);
+    let mut results = Vec::new();
+    for cell in &table.cell {
+        let found = run_cell(&table, cell, 0..seeds)?;
+        let values = [
+            ("right", found.right as f64),
+            ("tried", found.tried as f64),
+            ("false_done", found.false_done as f64),
+            ("most_n", found.most_n),
+        ];
+        result.rows.push(Row { group: Some(cell.primitive.to_string()), ..Row::new(cell.name.as_str(), values) });
+        for reason in found.words.keys().filter(|_| cell.fault.is_none()).take(REASONS) {
+            result.notes.push(format!("{} / {}: {reason}", cell.primitive, cell.name));
+        }
+        results.push(found);
+    }
+    let sum = figures(&results);
+    result.seeds = vec![0, seeds.saturating_sub(1)];
+    result.figure("primitive_success", sum.primitive_success);
+    result.figure("insertion_success_1mm", sum.insertion[0]);
+    result.figure("insertion_success_05mm", sum.insertion[1]);
+    result.figure("primitive_false_done", sum.false_done as f64);
+    result.notes.push(format!("worst cell: {}", sum.worst.trim()));
+    Ok(())
+}
 
 /// What came of a cell.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,7 +65,7 @@ pub struct CellResult {
     pub false_done: usize,
     /// Greatest force at the wrist, newtons.
     pub most_n: f64,
-    /// Some of the reasons given, with how often.
+    /// The reasons given, with how often.
     pub words: BTreeMap<String, usize>,
 }
 
@@ -93,5 +135,33 @@ pub fn figures(results: &[CellResult]) -> Figures {
         insertion: [insertion("1.0 mm"), insertion("0.5 mm")],
         false_done: results.iter().map(|result| result.false_done).sum(),
         worst: worst.map(|result| result.line()).unwrap_or_default(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+    use super::*;
+
+    #[test]
+    fn every_primitive_does_its_work_and_never_says_done_for_nothing() {
+        let table = Table::own().unwrap();
+        for cell in &table.cell {
+            let result = run_cell(&table, cell, 1..2).unwrap();
+            assert_eq!((result.right, result.false_done), (1, 0), "{} {:?}", result.line(), result.words);
+        }
+    }
+
+    #[test]
+    fn an_untrue_done_is_counted() {
+        // A block that is put down 20 mm from where the judge wants it.
+        let table = Table::parse(
+            "t.toml",
+            "[[cell]]\nprimitive = 'release'\nname = 'far'\nwidth_mm = 40\ndepth_mm = 40\nheight_mm = 40\nmass_g = 50\n\
+             friction = 0.5\nx_mm = -80\ny_mm = 0\nbelieved_off_mm = 20\n",
+        )
+        .unwrap();
+        let result = run_cell(&table, &table.cell[0], 0..1).unwrap();
+        assert_eq!((result.right, result.false_done), (0, 1), "{:?}", result.words);
     }
 }

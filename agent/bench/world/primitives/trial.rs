@@ -223,7 +223,12 @@ impl<'a> Stage<'a> {
                         insert.destination = place(Pose::new(FIXTURE + off.extend(0.0), self.goal.rotation));
                         insert
                     }
-                    _ => with_held("place-upright", &[("grip_width", thing.width), ("height", thing.height)]),
+                    _ => {
+                        let mut down = with_held("place-upright", &[("grip_width", thing.width), ("height", thing.height)]);
+                        let off = self.values.metres("believed_off") * DVec3::X;
+                        down.destination = place(Pose::new(self.goal.translation + off, self.goal.rotation));
+                        down
+                    }
                 };
                 self.test(next)
             }
