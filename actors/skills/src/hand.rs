@@ -176,10 +176,6 @@ impl Hand {
     pub fn ticks(&self, seconds: f64) -> u32 {
         (seconds / self.robot.tick_s).ceil().clamp(1.0, 1e6) as u32
     }
-    /// Measured height of the finger tips, metres.
-    pub fn tip_height_m(&self, tcp: &Pose) -> f64 {
-        tcp.translation.z - self.tip_reach_m
-    }
 }
 
 /// What the arms but one fill in the world.

@@ -134,6 +134,10 @@ impl Path {
             Path::through(from, &[Pose::new(up, from.rotation), Pose::new(across, goal.rotation), goal], pace, tick_s);
         Path { travels: true, ..path }
     }
+    /// The same where any way to its end will do that keeps clear of things.
+    pub fn freely(self) -> Path {
+        Path { travels: true, ..self }
+    }
     /// Straight up or down to a height.
     pub fn vertical(from: Pose, height_m: f64, pace: Pace, tick_s: f64) -> Path {
         let to = Pose::new(DVec3::new(from.translation.x, from.translation.y, height_m), from.rotation);

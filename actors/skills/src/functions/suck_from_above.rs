@@ -10,7 +10,7 @@ use crate::{
     hand::{Hand, holds_something},
     motion::{Pace, Path},
     primitives::{Carry, Failure, GripWatch, Outcome, Reach, Suck},
-    run::{Function, Next, Notes},
+    run::{Function, Next, Notes, WayOut},
 };
 use acm_concept::{
     embodiment::Feedback,
@@ -139,8 +139,8 @@ impl Function for SuckFromAbove {
             }
         }
     }
-    fn withdraw_height_m(&self) -> f64 {
-        self.carry_height_m
+    fn way_out(&self) -> WayOut {
+        WayOut::Up(self.carry_height_m)
     }
     fn object(&self) -> ObjectId {
         self.object

@@ -54,7 +54,7 @@ impl GripWatch {
         if hand.robot.suction.is_some() {
             return if feedback.vacuum > SEALED { Ok(Grip::Firm) } else { lost("the cup has no vacuum") };
         }
-        if gap_m < CLOSED_M {
+        if gap_m < CLOSED_M.min(0.5 * self.gap_m) {
             return lost("the fingers closed");
         }
         let pads = pads_in_contact(feedback);
