@@ -4,7 +4,11 @@ use crate::{
     articulation::{Articulation, let_pass},
     contact::Contacts,
     convert::{from_engine, to_engine, vector},
-    model::{Link, Piece, Weight, joint::Follows, variables::OF_OBJECT},
+    model::{
+        Link, Piece, Weight,
+        joint::{Follows, Joint, JointKind},
+        variables::OF_OBJECT,
+    },
     oracle::Watch,
     placed::Placed,
 };
@@ -64,11 +68,8 @@ impl Body {
             Some(joint) => {
                 let pose = to_engine(&(self.placed.pose * *start));
                 let builder = RigidBodyBuilder::dynamic().pose(pose).can_sleep(!Articulation::is_alive(joint));
-                world.insert_body(if link.volume() > 0.0 {
-                    builder
-                } else {
-                    builder.additional_mass_properties(ghost(link))
-                })
+                let more = inertia(link, joint, Articulation::armature(joint, world));
+                world.insert_body(builder.additional_mass_properties(more))
             }
         };
         self.colliders.extend(insert_pieces(world, link, carrier));
@@ -176,14 +177,19 @@ impl Body {
     }
 }
 
-/// Mass of a link that is seen and not felt, such as a burner's glow: that of a ball in its middle.
-fn ghost(link: &Link) -> MassProperties {
-    const MASS_KG: f32 = 0.01;
+/// What a link has besides the mass of what is felt of it: the joint's armature, and 10 g for one that is only seen, such
+/// as a burner's glow.
+fn inertia(link: &Link, joint: &Joint, armature: f64) -> MassProperties {
     let start = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     let bounds = link.pieces.iter().map(|piece| piece.bounds(&Pose::IDENTITY));
     let (low, high) = bounds.fold(start, |a, b| (a.0.min(b.0), a.1.max(b.1)));
     let middle = if low.is_finite() { vector(0.5 * (low + high)) } else { Vector::ZERO };
-    MassProperties::new(middle, MASS_KG, Vector::splat(0.4 * MASS_KG * 0.05 * 0.05))
+    let (ghost_kg, ghost_kg_m2) = if link.volume() > 0.0 { (0.0, 0.0) } else { (0.01, 1e-5) };
+    let (mass, turn) = match joint.kind {
+        JointKind::Hinge => (ghost_kg, ghost_kg_m2 + armature),
+        JointKind::Slider => (ghost_kg + armature, ghost_kg_m2),
+    };
+    MassProperties::new(middle, mass as f32, Vector::splat(turn as f32))
 }
 
 fn insert_pieces(world: &mut PhysicsWorld, link: &Link, body: RigidBodyHandle) -> Vec<ColliderHandle> {

@@ -16,6 +16,8 @@ use std::{
 
 /// Force at a handle, newtons.
 const FORCE_N: f64 = 60.0;
+/// Speed at a handle up to which it is pushed, metres per second.
+const FASTEST_M_S: f64 = 0.5;
 /// A joint moves if it reaches this share of its range.
 const MOST: f64 = 0.75;
 const KITCHEN: [&str; 7] = ["microwave", "hingecabinet", "slidecabinet", "oven", "kettle", "counters1", "backwall"];
@@ -50,21 +52,25 @@ fn driven(scenario: &Scenario, name: &str) -> (f64, bool, String) {
     let reach = if start.is_hinge { reach(&truth(&world), name) } else { 1.0 };
     let force = (1.5 * start.friction + 10.0 * reach).min(FORCE_N * reach);
     let mut best = 0.0f64;
-    for _ in 0..16 {
-        push(&mut world, name, far * force, 0.25);
+    // A hand goes on slowly; heavy drawers take their time.
+    for _ in 0..250 {
         let now = joint(&world, name);
         best = best.max(opened(&now, start.position));
         if best > 0.98 {
             break;
         }
+        let force = if far * now.speed * reach > FASTEST_M_S { 0.0 } else { force };
+        push(&mut world, name, far * force, 0.04);
     }
+    let how =
+        format!("at {:.3}, pushed with {force:.1}, touches {}", joint(&world, name).position, touching(&world, name));
     run(&mut world, 0.5);
     let thing = truth(&world);
     let sound = thing.links.iter().all(|link| {
         let near = link.pose.translation.is_finite() && link.pose.translation.length() < 10.0;
         near && link.joint.as_ref().is_none_or(|joint| joint.speed.is_finite() && joint.speed.abs() < 30.0)
     });
-    (best, sound, format!("at {:?}, pushed with {force:.1}, touches {}", joint(&world, name), touching(&world, name)))
+    (best, sound, format!("{how}, at rest with {:.3}/s", joint(&world, name).speed))
 }
 
 /// The links of the thing that a link touches.

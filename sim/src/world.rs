@@ -126,6 +126,7 @@ impl World {
     fn settle(&mut self, seed: u64) -> Result<(), SimError> {
         let start: Vec<Pose> = self.bodies.iter().map(|body| body.pose(&self.physics)).collect();
         for _ in 0..(SETTLE_S / self.profile.step_s()).round() as u32 {
+            self.refresh_state();
             for body in &self.bodies {
                 body.act(&mut self.physics, &self.state);
             }

@@ -297,6 +297,14 @@ mod tests {
     }
 
     #[test]
+    fn the_worked_model_is_accepted() {
+        let guide = include_str!("../../../docs/objects.md");
+        let example = guide.split("```toml\n").nth(1).and_then(|rest| rest.split("```").next()).unwrap();
+        let safe = ObjectModel::parse("docs/objects.md", example).unwrap();
+        assert_eq!((safe.links.len(), safe.shows().count()), (2, 1));
+    }
+
+    #[test]
     fn bad_models_say_what_is_wrong() {
         assert!(ObjectModel::parse("a.toml", MAT).is_ok());
         let message = |text: &str| ObjectModel::parse("a.toml", text).unwrap_err().to_string();

@@ -5,8 +5,9 @@
 //!   For a slider that is the friction; for a hinge it is times the reach, kept within 0.2 to 2 N m.
 //! - Damping stays as it is up to 5 N s/m at the reach: at most 5 N s/m for a slider, at most 5 times the reach
 //!   squared, and never more than 5 N m s/rad, for a hinge.
-//! - A mass is believed if it makes the link's density 20 to 8000 kg/m3; otherwise it is the volume times 500 kg/m3,
-//!   kept within 5 g and 60 kg. Inertia always comes from the shapes.
+//! - A mass is believed if it makes the link's density 20 to 8000 kg/m3 and, of what moves, is at most 25 kg; otherwise
+//!   it is the volume times 500 kg/m3, kept within 5 g and 25 kg, or 60 kg of what does not move. Inertia comes from
+//!   the shapes.
 //!
 //! The *reach* is how far the link extends from its hinge's axis.
 
@@ -24,7 +25,9 @@ const HINGE_N_M: [f64; 2] = [0.2, 2.0];
 const MAX_DAMPING: f64 = 5.0;
 const BELIEVED_KG_M3: [f64; 2] = [20.0, 8000.0];
 const USUAL_KG_M3: f64 = 500.0;
-const MASS_KG: [f64; 2] = [0.005, 60.0];
+const LEAST_KG: f64 = 0.005;
+const MOST_KG: f64 = 60.0;
+const MOST_MOVING_KG: f64 = 25.0;
 
 /// What a file says of a joint, before the rule.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,12 +37,13 @@ pub(crate) struct Original {
 }
 
 /// The weight of a link of which a file says a mass, or nothing.
-pub(super) fn weight(mass_kg: Option<f64>, volume_m3: f64) -> Weight {
+pub(super) fn weight(mass_kg: Option<f64>, volume_m3: f64, moves: bool) -> Weight {
     let believed = |mass: &f64| {
         let density = mass / volume_m3.max(1e-9);
-        (BELIEVED_KG_M3[0]..=BELIEVED_KG_M3[1]).contains(&density)
+        (BELIEVED_KG_M3[0]..=BELIEVED_KG_M3[1]).contains(&density) && (!moves || *mass <= MOST_MOVING_KG)
     };
-    Weight::Mass(mass_kg.filter(believed).unwrap_or((USUAL_KG_M3 * volume_m3).clamp(MASS_KG[0], MASS_KG[1])))
+    let most = if moves { MOST_MOVING_KG } else { MOST_KG };
+    Weight::Mass(mass_kg.filter(believed).unwrap_or((USUAL_KG_M3 * volume_m3).clamp(LEAST_KG, most)))
 }
 
 /// Gives the joint of a link the dynamics that the rule allows it.
@@ -108,9 +112,11 @@ mod tests {
 
     #[test]
     fn absurd_masses_are_replaced() {
-        assert_eq!(weight(Some(2.0), 0.004), Weight::Mass(2.0));
-        assert_eq!(weight(Some(2000.0), 0.004), Weight::Mass(2.0));
-        assert_eq!(weight(None, 0.004), Weight::Mass(2.0));
-        assert_eq!(weight(Some(0.0), 1e-9), Weight::Mass(0.005));
+        assert_eq!(weight(Some(2.0), 0.004, true), Weight::Mass(2.0));
+        assert_eq!(weight(Some(2000.0), 0.004, false), Weight::Mass(2.0));
+        assert_eq!(weight(Some(50.0), 0.01, true), Weight::Mass(5.0));
+        assert_eq!(weight(Some(50.0), 0.01, false), Weight::Mass(50.0));
+        assert_eq!(weight(None, 0.004, true), Weight::Mass(2.0));
+        assert_eq!(weight(Some(0.0), 1e-9, true), Weight::Mass(0.005));
     }
 }

@@ -186,7 +186,7 @@ impl Builder {
         }
         self.shift(-(0.5 * (low + high)).with_z(low.z));
         for (link, mass) in self.links.iter_mut().zip(&self.masses) {
-            link.weight = normalise::weight(*mass, link.volume());
+            link.weight = normalise::weight(*mass, link.volume(), link.joint.is_some());
         }
         let loaded = Loaded { warnings: self.warnings, originals: self.originals, masses_kg: self.masses };
         let model = ObjectModel::new(String::new(), summary, fixed, self.links);
