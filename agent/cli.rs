@@ -7,6 +7,7 @@ use acm_actors::{
     remote::{Address, FrameMode},
     trace::FrameDetail,
 };
+use acm_sim::Setting;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::{path::PathBuf, process::ExitCode, str::FromStr};
 
@@ -171,6 +172,9 @@ pub struct RunArgs {
     /// Another sensor profile than the scenario's: none, d435, d435-hard.
     #[arg(long, value_name = "PROFILE")]
     pub sensor: Option<String>,
+    /// Set a field of the scenario otherwise, as in robot.model=panda. May be given more than once.
+    #[arg(long, value_name = "PATH=VALUE", conflicts_with = "robot")]
+    pub set: Vec<Setting>,
     /// Write every message, effect and change of memory into this MCAP file. Of a range, or in a folder, each run has
     /// a file of its own.
     #[arg(long, value_name = "FILE")]
@@ -264,6 +268,9 @@ pub enum ScenarioCommand {
         /// The seed.
         #[arg(long, default_value_t = 0)]
         seed: u64,
+        /// Set a field of the scenario otherwise, as in robot.model=panda. May be given more than once.
+        #[arg(long, value_name = "PATH=VALUE")]
+        set: Vec<Setting>,
         /// The PNG to write.
         #[arg(short, long, value_name = "PNG")]
         out: PathBuf,
@@ -294,6 +301,9 @@ pub struct ServeArgs {
     /// Another sensor profile than the scenario's: none, d435, d435-hard.
     #[arg(long, value_name = "PROFILE")]
     pub sensor: Option<String>,
+    /// Set a field of the scenario otherwise, as in robot.model=panda. May be given more than once.
+    #[arg(long, value_name = "PATH=VALUE")]
+    pub set: Vec<Setting>,
     /// How frames go to the agent: auto, shared-memory, inline.
     #[arg(long, value_name = "WAY", default_value = "auto")]
     pub frames: FrameMode,
@@ -365,6 +375,8 @@ pub enum BenchCommand {
     Perception(BenchArgs),
     /// Frames between processes, messages between actors, what a trace costs, how fast an actor is replaced.
     Runtime(BenchArgs),
+    /// Physics beside MuJoCo, grasps, primitives, rendering, pace, physics audit, snapshots.
+    World(BenchArgs),
 }
 
 /// Arguments of every bench.

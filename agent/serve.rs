@@ -14,7 +14,7 @@ use std::{
 
 /// Serves a scenario's world until the process is interrupted.
 pub fn run(args: &ServeArgs) -> anyhow::Result<Exit> {
-    let scenario = Scenario::open(&args.scenario)?;
+    let scenario = Scenario::open_with(&args.scenario, &args.set)?;
     let faults = Faults::new(&args.inject);
     ensure!(
         faults == Faults { slip_at: faults.slip_at, drop_at: faults.drop_at, ..Faults::default() },

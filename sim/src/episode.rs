@@ -38,7 +38,7 @@ pub type SharedRenderer = Arc<Mutex<Renderer>>;
 /// let simulation = Simulation::without_renderer(&scenario, &SimOptions::default())?;
 /// let mut robot = simulation.embodiment();
 /// let here = robot.feedback();
-/// let command = acm_concept::embodiment::Command { tcp: here.tcp, opening_m: 0.08, grip_force_n: 20.0 };
+/// let command = acm_concept::embodiment::Command::hand(here.tcp, 0.08, 20.0);
 /// assert!((robot.command(&command)?.time.seconds() - 0.02).abs() < 1e-9);
 /// assert!(!simulation.verdict().strict);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -100,7 +100,7 @@ impl Simulation {
 
     /// The robot.
     pub fn embodiment(&self) -> Box<dyn Embodiment> {
-        let robot = self.world().robot.clone();
+        let robot = self.world().robot.description.clone();
         Box::new(Robot { shared: self.shared.clone(), robot })
     }
 

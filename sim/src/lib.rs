@@ -7,7 +7,8 @@
 //! |---|---|
 //! | `scenario`, `model` | scenario files and object models: raw text to checked meaning |
 //! | `random`, `layout`, `placed` | seeded draws, start layouts, rejection, how one copy is made |
-//! | `world`, `body`, `articulation`, `gripper`, `contact` | the running physics: objects, their joints, the hand, what it feels |
+//! | `world`, `body`, `articulation`, `contact` | the running physics: objects, their joints, what the pads touch |
+//! | `robot` | robots as data: arms, wrists, hands, their limits and what they feel |
 //! | `event`, `mishap` | what third parties do, and mishaps with what is carried |
 //! | `fluent` | regions, named quantities and the rules that change them |
 //! | `oracle`, `state` | the judge and its variables |
@@ -25,7 +26,6 @@ mod event;
 #[cfg(test)]
 mod expert;
 mod fluent;
-mod gripper;
 mod layout;
 mod mishap;
 mod model;
@@ -34,6 +34,7 @@ mod placed;
 mod profile;
 mod random;
 mod report;
+mod robot;
 mod scenario;
 mod scene;
 #[cfg(test)]
@@ -51,5 +52,6 @@ pub use oracle::OracleVerdict;
 pub use profile::PhysicsProfile;
 pub use random::DrawError;
 pub use report::{Preview, SimError, SimOptions, SimTimings};
-pub use scenario::{MAX_SCENARIO_BYTES, Scenario, ScenarioError};
+pub use robot::RobotError;
+pub use scenario::{MAX_SCENARIO_BYTES, Scenario, ScenarioError, Setting};
 pub use truth::{TrueJoint, TrueLink, TrueObject, TruePiece, TrueShape};

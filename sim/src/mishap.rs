@@ -1,6 +1,6 @@
 //! Mishaps with what the hand carries: it is gone and stands somewhere near, or the fingers let it fall.
 
-use crate::{body::Body, event::put, gripper::Grip, layout::gap, placed::solids_at, world::World};
+use crate::{body::Body, event::put, layout::gap, placed::solids_at, world::World};
 use acm_concept::{camera::CameraModel, pose::Pose};
 use glam::{DVec2, DVec3};
 use rand::{Rng, SeedableRng};
@@ -24,9 +24,8 @@ const BORDER: f64 = 30.0 / 640.0;
 /// Places tried in one physics step; the next step tries again from where the hand is then.
 const TRIES: u32 = 64;
 
-/// How long the fingers stay open in a drop, seconds, and how far they open, metres.
+/// How long the hand lets go in a drop, seconds.
 const DROP_S: f64 = 0.3;
-const DROP_OPENING_M: f64 = 0.02;
 
 /// What goes wrong with what the hand carries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -95,11 +94,9 @@ impl Mishap {
         }
     }
 
-    /// What the fingers do now in place of what they were told, if the mishap has them.
-    pub(crate) fn grip(&self, world: &World, commanded: Grip) -> Option<Grip> {
-        let open = world.seconds() < self.open_until_s;
-        let opening_m = commanded.opening_m.max(world.gripper.opening(&world.physics) + DROP_OPENING_M);
-        open.then_some(Grip { opening_m: opening_m.min(world.robot.max_opening_m), ..commanded })
+    /// Whether the hand lets go now, whatever it was told.
+    pub(crate) fn drops(&self, world: &World) -> bool {
+        world.seconds() < self.open_until_s
     }
 
     fn strike(&mut self, world: &mut World) {
@@ -148,6 +145,6 @@ impl Mishap {
             let there = solids_at(&other.placed, &other.pose(&world.physics));
             gap(&here, &there).is_ok_and(|gap| gap >= CLEARANCE_M)
         });
-        seen && clear && world.robot.reaches(centre)
+        seen && clear && world.robot.description.reaches(centre)
     }
 }

@@ -57,20 +57,14 @@ impl Stage {
                 }
             }
         }
-        self.add_hand(world, &mut scene, ids.hand());
+        self.add_robot(world, &mut scene, ids.hand());
         scene
     }
 
-    fn add_hand(&self, world: &World, scene: &mut Scene, id: u32) {
-        let tcp = world.gripper.tcp(&world.physics);
-        for part in &world.robot.hand {
-            scene.instances.push(self.instance(&part.solid, tcp * part.pose, HAND_COLOR, id));
-        }
-        let mirror = Pose::from_yaw(DVec3::ZERO, std::f64::consts::PI);
-        for (frame, turn) in world.gripper.finger_poses(&world.physics).into_iter().zip([Pose::IDENTITY, mirror]) {
-            for part in &world.robot.finger {
-                scene.instances.push(self.instance(&part.solid, frame * turn * part.pose, FINGER_COLOR, id));
-            }
+    fn add_robot(&self, world: &World, scene: &mut Scene, id: u32) {
+        for (part, is_finger) in world.robot.seen(&world.physics) {
+            let color = if is_finger { FINGER_COLOR } else { HAND_COLOR };
+            scene.instances.push(self.instance(&part.solid, part.pose, color, id));
         }
     }
 

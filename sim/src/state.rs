@@ -32,14 +32,14 @@ pub(crate) fn constants(spec: &WorldSpec, layout: &Layout) -> Vec<f64> {
 /// Writes the values of all variables.
 pub(crate) fn fill(world: &World, values: &mut Vec<f64>) {
     let physics = &world.physics;
-    let tcp = world.gripper.tcp(physics).translation;
+    let tcp = world.robot.tcp(physics).translation;
     let moved = |index: &usize| {
         let body = &world.bodies[*index];
         body.pose(physics).translation.distance(body.start.translation)
     };
     values.clear();
     values.push(world.bystanders.iter().map(moved).fold(0.0, f64::max));
-    values.push(world.grip.opening_m / world.robot.max_opening_m);
+    values.push(world.robot.commanded_opening());
     values.push(world.contacts.pads_in_contact() as f64);
     values.extend([tcp.x, tcp.y, tcp.z, world.seconds()]);
     values.extend(&world.constants);

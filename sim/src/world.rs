@@ -1,11 +1,10 @@
-//! The running world: physics, hand, mechanisms, what third parties do, and the judge who watches.
+//! The running world: physics, robot, mechanisms, what third parties do, and the judge who watches.
 
 use crate::{
     body::Body,
-    contact::{Contacts, TickForces},
+    contact::Contacts,
     event::{self, Event},
     fluent::Fluents,
-    gripper::{self, Grip, Gripper, TICK_S},
     layout::{Layout, LayoutError, number, vector},
     mishap::{Mishap, MishapKind},
     model::ObjectModel,
@@ -13,13 +12,14 @@ use crate::{
     placed::Placed,
     profile::PhysicsProfile,
     report::{SimError, SimOptions, SimTimings},
+    robot::{Robot, TICK_S},
     scenario::{CameraSpec, JudgeSpec, Scenario, SurfaceSpec, WorldSpec},
     state,
     truth::{TrueObject, true_objects},
 };
 use acm_concept::{
     camera::{CameraModel, Mount},
-    embodiment::{Command, EmbodimentError, Feedback, RobotDescription},
+    embodiment::{Command, EmbodimentError, Feedback},
     expression::Expression,
     pose::Pose,
     time::Time,
@@ -33,24 +33,18 @@ use std::sync::Arc;
 const SETTLE_S: f64 = 0.5;
 /// An object that turns or shifts more than this while settling was not placed at rest: degrees, metres.
 const SETTLED: (f64, f64) = (3.0, 0.01);
-/// Commands may exceed the speed limits by this factor, which absorbs rounding.
-const TOLERANCE: f64 = 1.0 + 1e-6;
 
 /// Everything that is simulated. The episode's handles share one.
 pub(crate) struct World {
     pub(crate) physics: PhysicsWorld,
     pub(crate) profile: PhysicsProfile,
-    pub(crate) robot: RobotDescription,
-    pub(crate) gripper: Gripper,
+    pub(crate) robot: Robot,
     pub(crate) bodies: Vec<Body>,
     /// Of the scenario's objects, in their order.
     pub(crate) models: Vec<Arc<ObjectModel>>,
     pub(crate) surfaces: Vec<(ColliderHandle, SurfaceSpec)>,
     pub(crate) contacts: Contacts,
     pub(crate) timings: SimTimings,
-    /// The hand's commanded pose at the end of the last tick.
-    target: Pose,
-    pub(crate) grip: Grip,
     events: Vec<Event>,
     mishaps: Vec<Mishap>,
     pub(crate) fluents: Fluents,
@@ -64,7 +58,6 @@ pub(crate) struct World {
     pub(crate) constants: Vec<f64>,
     pub(crate) bystanders: Vec<usize>,
     steps: u64,
-    forces: TickForces,
     motion: bool,
     stopped: bool,
 }
@@ -93,8 +86,7 @@ impl World {
         let insert =
             |object: &Placed| Body::insert(&mut physics, object.clone(), spec.objects[object.spec].count.is_some());
         let mut bodies: Vec<Body> = layout.objects.iter().map(insert).collect();
-        let robot = gripper::description(spec.home, spec.workspace);
-        let gripper = Gripper::build(&mut physics, &robot);
+        let robot = Robot::build(&mut physics, &spec.robot);
         let variables = state::names(scenario);
         for body in &mut bodies {
             body.set_shows(state::shows(&spec.objects[body.placed.spec], &variables));
@@ -110,14 +102,11 @@ impl World {
             judge: Judge::new(&scenario.judge, &variables),
             constants: state::constants(spec, layout),
             state: vec![0.0; variables.len()],
-            target: robot.home,
-            grip: Grip { opening_m: robot.max_opening_m, force_n: robot.max_grip_force_n },
             mishaps: mishaps(spec, options),
             fluents: Fluents::build(spec, layout, &variables).map_err(layout_error)?,
             lighting: lighting(spec, layout).map_err(layout_error)?,
             exposures: exposures(spec, layout).map_err(layout_error)?,
             contacts: Contacts::default(),
-            forces: TickForces::default(),
             timings: SimTimings::default(),
             motion: options.motion,
             stopped: false,
@@ -126,7 +115,6 @@ impl World {
             models: spec.objects.iter().map(|object| object.model.clone()).collect(),
             surfaces,
             bodies,
-            gripper,
             robot,
             profile,
             physics,
@@ -142,7 +130,7 @@ impl World {
             for body in &self.bodies {
                 body.act(&mut self.physics, &self.state);
             }
-            self.gripper.drive(&mut self.physics, &self.target, self.grip);
+            self.robot.drive(&mut self.physics, 1.0, false);
             self.physics.step();
             for body in &mut self.bodies {
                 body.measure(&self.physics);
@@ -158,7 +146,7 @@ impl World {
             body.start = pose;
             body.measure(&self.physics);
         }
-        self.contacts.read(&self.physics, &self.gripper);
+        self.contacts.read(&self.physics, &self.robot);
         self.refresh_state();
         Ok(())
     }
@@ -179,55 +167,24 @@ impl World {
         if self.stopped {
             return Err(EmbodimentError::Stopped);
         }
-        if let Some(reason) = self.refusal(command) {
-            return Err(EmbodimentError::Refused { reason });
-        }
-        self.grip = Grip { opening_m: command.opening_m, force_n: command.grip_force_n };
-        self.tick(command.tcp);
-        Ok(self.feedback())
+        self.robot.aim(command).map_err(|reason| EmbodimentError::Refused { reason })?;
+        self.tick().map_or_else(|| Ok(self.feedback()), |reason| Err(EmbodimentError::ProtectiveStop { reason }))
     }
 
-    fn refusal(&self, command: &Command) -> Option<String> {
-        let robot = &self.robot;
-        if !(command.tcp.is_valid() && command.opening_m.is_finite() && command.grip_force_n.is_finite()) {
-            return Some("it holds numbers that are not finite, or a rotation that is not one".into());
-        }
-        if !robot.reaches(command.tcp.translation) {
-            let (low, high) = (robot.workspace_min, robot.workspace_max);
-            return Some(format!("{} lies outside of the workspace {low} to {high} m", command.tcp.translation));
-        }
-        let shift = command.tcp.translation.distance(self.target.translation) / robot.tick_s;
-        if shift > robot.max_speed_m_s * TOLERANCE {
-            return Some(format!("it asks for {shift:.3} m/s, the fastest is {} m/s", robot.max_speed_m_s));
-        }
-        let turn = command.tcp.angle_to(&self.target) / robot.tick_s;
-        // The angle between nearly equal rotations is only known to about 1e-7.
-        if turn > robot.max_turn_rad_s * TOLERANCE + 1e-4 {
-            return Some(format!("it asks for {turn:.3} rad/s, the fastest is {} rad/s", robot.max_turn_rad_s));
-        }
-        if !(0.0..=robot.max_opening_m * TOLERANCE).contains(&command.opening_m) {
-            return Some(format!("an opening of {} m is not in 0 to {} m", command.opening_m, robot.max_opening_m));
-        }
-        if !(0.0..=robot.max_grip_force_n * TOLERANCE).contains(&command.grip_force_n) {
-            return Some(format!("a force of {} N is not in 0 to {} N", command.grip_force_n, robot.max_grip_force_n));
-        }
-        None
-    }
-
-    /// Advances by one control tick while the commanded pose moves evenly to `target`.
-    fn tick(&mut self, target: Pose) {
+    /// Advances by one control tick while the robot moves evenly to its aim. Says why it stopped on the way.
+    fn tick(&mut self) -> Option<String> {
         let started = cpu_s(ClockId::ThreadCPUTime);
-        let from = self.target;
         let steps = (TICK_S * f64::from(self.profile.steps_per_second)).round() as u32;
-        self.forces = TickForces::default();
+        self.robot.begin();
         for step in 1..=steps {
-            self.step(&from.interpolate(&target, f64::from(step) / f64::from(steps)));
+            self.step(f64::from(step) / f64::from(steps));
         }
-        self.target = target;
         self.timings.physics_s += cpu_s(ClockId::ThreadCPUTime) - started;
+        self.robot.end()
     }
 
-    fn step(&mut self, target: &Pose) {
+    /// One physics step; `fraction` is the share of the control tick that is behind after it.
+    fn step(&mut self, fraction: f64) {
         let now_s = self.seconds();
         for event in &mut self.events {
             event.step(&mut self.physics, &mut self.bodies, &self.state, now_s);
@@ -235,15 +192,15 @@ impl World {
         for body in &self.bodies {
             body.act(&mut self.physics, &self.state);
         }
-        let grip = self.mishaps.iter().find_map(|mishap| mishap.grip(self, self.grip)).unwrap_or(self.grip);
-        self.gripper.drive(&mut self.physics, target, grip);
+        let drops = self.mishaps.iter().any(|mishap| mishap.drops(self));
+        self.robot.drive(&mut self.physics, fraction, drops);
         self.physics.step();
         self.steps += 1;
         for body in &mut self.bodies {
             body.measure(&self.physics);
         }
-        self.contacts.read(&self.physics, &self.gripper);
-        self.forces.add(&self.contacts, self.gripper.wrist_force(&self.physics));
+        self.contacts.read(&self.physics, &self.robot);
+        self.robot.feel(&self.physics, &self.contacts);
         // Taken out and put back, because what happens in a mishap looks at the whole world.
         let mut mishaps = std::mem::take(&mut self.mishaps);
         for mishap in &mut mishaps {
@@ -267,7 +224,7 @@ impl World {
         match camera.mount {
             Mount::World => camera.clone(),
             Mount::Hand => {
-                let pose = self.gripper.tcp(&self.physics) * camera.pose;
+                let pose = self.robot.tcp(&self.physics) * camera.pose;
                 CameraModel { pose, ..camera.clone() }
             }
         }
@@ -283,25 +240,15 @@ impl World {
         self.events.iter().any(|event| event.covers(camera))
     }
 
-    /// What the hand measures.
+    /// What the robot measures.
     pub(crate) fn feedback(&self) -> Feedback {
-        let tcp = self.gripper.tcp(&self.physics);
-        let (pads, wrist) = self.forces.mean();
-        Feedback {
-            time: self.now(),
-            tcp,
-            joints: Vec::new(),
-            opening_m: self.gripper.opening(&self.physics),
-            commanded_opening_m: self.grip.opening_m,
-            pad_force_n: pads.map(|force| tcp.inverse().transform_vector(force)),
-            wrist_force_n: wrist,
-        }
+        self.robot.feedback(&self.physics, self.now())
     }
 
-    /// Stops all motion; the hand stays where it is.
+    /// Stops all motion; the robot stays where it is.
     pub(crate) fn stop(&mut self) {
         self.stopped = true;
-        self.target = self.gripper.tcp(&self.physics);
+        self.robot.stop(&self.physics);
     }
 
     /// Takes a stop back.
@@ -316,7 +263,9 @@ impl World {
             return Err(EmbodimentError::Refused { reason });
         }
         while self.now() < moment {
-            self.tick(self.target);
+            if let Some(reason) = self.tick() {
+                return Err(EmbodimentError::ProtectiveStop { reason });
+            }
         }
         Ok(self.now())
     }
@@ -328,7 +277,7 @@ impl World {
         let saved = Saved::take(self, ahead);
         let until = self.seconds() + self.judge.settle_s();
         while self.seconds() < until {
-            self.step(&self.target.clone());
+            self.step(1.0);
         }
         let verdict = self.judge.verdict(&self.state);
         saved.restore(self);
@@ -347,7 +296,7 @@ const MAX_WAIT_S: f64 = 3600.0;
 struct Saved {
     physics: PhysicsWorld,
     bodies: Vec<Body>,
-    gripper: Gripper,
+    robot: Robot,
     contacts: Contacts,
     judge: Judge,
     events: Vec<Event>,
@@ -355,7 +304,6 @@ struct Saved {
     fluents: Fluents,
     state: Vec<f64>,
     steps: u64,
-    forces: TickForces,
 }
 
 impl Saved {
@@ -364,7 +312,7 @@ impl Saved {
         Saved {
             physics: std::mem::replace(&mut world.physics, ahead),
             bodies: world.bodies.clone(),
-            gripper: world.gripper.clone(),
+            robot: world.robot.clone(),
             contacts: world.contacts.clone(),
             judge: world.judge.clone(),
             events: world.events.clone(),
@@ -372,13 +320,12 @@ impl Saved {
             fluents: world.fluents.clone(),
             state: world.state.clone(),
             steps: world.steps,
-            forces: world.forces.clone(),
         }
     }
     fn restore(self, world: &mut World) {
         world.physics = self.physics;
         world.bodies = self.bodies;
-        world.gripper = self.gripper;
+        world.robot = self.robot;
         world.contacts = self.contacts;
         world.judge = self.judge;
         world.events = self.events;
@@ -386,7 +333,6 @@ impl Saved {
         world.fluents = self.fluents;
         world.state = self.state;
         world.steps = self.steps;
-        world.forces = self.forces;
     }
 }
 

@@ -165,6 +165,7 @@ mod tests {
             max_turn_rad_s: 2.0,
             tick_s: 0.02,
             home: downward(DVec3::new(0.0, -0.4, 0.4), 0.0),
+            ..RobotDescription::default()
         }
     }
 
@@ -206,8 +207,9 @@ mod tests {
             commanded_opening_m: 0.08,
             pad_force_n: [DVec3::ZERO; 2],
             wrist_force_n: DVec3::ZERO,
+            ..acm_concept::embodiment::Feedback::default()
         };
-        let hand = Hand::new(&robot(), &feedback);
+        let hand = Hand::of_arm(&robot(), &feedback, 0);
         let height = |obstacle| safe_height(&hand, DVec3::ZERO, DVec3::X * 0.3, &[obstacle], 0.0, 0.03);
         assert_eq!(height(cube(0.15, 0.6, 0.2)), Ok(0.07));
         assert_eq!(height(cube(0.15, 0.0, 0.2)), Ok(0.22 + 0.03 + SAFETY_M));

@@ -1,9 +1,11 @@
 //! What a controller is, how one is started, and why one cannot be.
 
 use crate::{
-    functions::{grasp_from_above::GraspFromAbove, place_upright::PlaceUpright, press_down::PressDown},
+    arm::choice::choose,
+    functions::*,
     hand::Hand,
-    run::Run,
+    run::{Function, Run},
+    sequence::Sequence,
 };
 use acm_concept::{
     embodiment::{Command, Feedback, RobotDescription},
@@ -102,17 +104,56 @@ pub enum StartError {
         /// The function kind.
         kind: String,
     },
-    /// The hand would have to tilt, which these controllers cannot.
-    #[error("to put it there the hand would have to tilt by {:.0} degrees; it only works pointing down", tilt_rad.to_degrees())]
+    /// The hand would have to come from where it cannot.
+    #[error("for that the hand would have to tilt by {:.0} degrees from pointing down; take it in another way", tilt_rad.to_degrees())]
     Tilted {
         /// Angle between the approach direction and straight down, radians.
         tilt_rad: f64,
     },
 }
 
+/// Starts a function kind.
+type Start = fn(&SkillInvocation, Hand, &Feedback) -> Result<Box<dyn Controller>, StartError>;
+
+/// The function kinds, in alphabetical order.
+const KINDS: &[(&str, Start)] = &[
+    ("flip", |i, h, f| Ok(run(i, Sequence::new(flip::Flip::plan(i, &h, f)?), h))),
+    ("grasp-along", |i, h, f| Ok(run(i, Sequence::new(grasp_along::GraspAlong::plan(i, &h, f)?), h))),
+    // What a hand does to take a part from above depends on the hand.
+    ("grasp-from-above", |i, h, f| match h.robot.suction.is_some() {
+        true => Ok(run(i, suck_from_above::SuckFromAbove::plan(i, &h, f)?, h)),
+        false => Ok(run(i, grasp_from_above::GraspFromAbove::plan(i, &h, f)?, h)),
+    }),
+    ("hinge-close", |i, h, _| match i.arguments.contains_key("grip_width") {
+        true => Ok(run(i, Sequence::new(hinge_close::draw(i, &h)?), h)),
+        false => Ok(run(i, Sequence::new(hinge_close::push(i, &h)?), h)),
+    }),
+    ("hinge-open", |i, h, _| Ok(run(i, Sequence::new(hinge_open::plan(i, &h)?), h))),
+    ("insert-along", |i, h, f| Ok(run(i, Sequence::new(insert_along::InsertAlong::plan(i, &h, f)?), h))),
+    ("move-to", |i, h, _| Ok(run(i, Sequence::new(move_to::plan(i, &h)?), h))),
+    ("place-upright", |i, h, f| Ok(run(i, place_upright::PlaceUpright::plan(i, &h, f)?, h))),
+    ("press", |i, h, f| Ok(run(i, Sequence::new(press::Press::plan(i, &h, f)?), h))),
+    ("press-down", |i, h, f| Ok(run(i, press_down::PressDown::plan(i, &h, f)?, h))),
+    ("pull-along", |i, h, _| Ok(run(i, Sequence::new(pull_along::plan(i, &h)?), h))),
+    ("push-along", |i, h, _| Ok(run(i, Sequence::new(push_along::plan(i, &h)?), h))),
+    ("reach", |i, h, _| Ok(run(i, Sequence::new(reach::Reach::plan(i, &h)?), h))),
+    ("release", |i, h, _| Ok(run(i, Sequence::new(release::Release::plan(i)?), h))),
+    ("rotate", |i, h, _| Ok(run(i, Sequence::new(rotate::plan(i, &h)?), h))),
+    ("slide-close", |i, h, _| match i.arguments.contains_key("grip_width") {
+        true => Ok(run(i, Sequence::new(slide_close::draw(i, &h)?), h)),
+        false => Ok(run(i, Sequence::new(slide_close::push(i, &h)?), h)),
+    }),
+    ("slide-open", |i, h, _| Ok(run(i, Sequence::new(slide_open::plan(i, &h)?), h))),
+    ("turn", |i, h, _| Ok(run(i, Sequence::new(turn::plan(i, &h)?), h))),
+];
+
+fn run(invocation: &SkillInvocation, function: impl Function + 'static, hand: Hand) -> Box<dyn Controller> {
+    Box::new(Run::new(invocation, hand, function))
+}
+
 /// The function kinds that this build can run, in alphabetical order.
-pub fn kinds() -> &'static [&'static str] {
-    &["grasp-from-above", "place-upright", "press-down"]
+pub fn kinds() -> Vec<&'static str> {
+    KINDS.iter().map(|(kind, _)| *kind).collect()
 }
 
 /// Starts the controller of `invocation.kind`. The feedback must be the present one: the motion begins where the
@@ -122,20 +163,10 @@ pub fn start(
     robot: &RobotDescription,
     feedback: &Feedback,
 ) -> Result<Box<dyn Controller>, StartError> {
-    let hand = Hand::new(robot, feedback);
-    Ok(match invocation.kind.as_str() {
-        "grasp-from-above" => {
-            let function = GraspFromAbove::plan(invocation, &hand, feedback)?;
-            Box::new(Run::new(invocation, hand, function))
-        }
-        "place-upright" => {
-            let function = PlaceUpright::plan(invocation, &hand, feedback)?;
-            Box::new(Run::new(invocation, hand, function))
-        }
-        "press-down" => {
-            let function = PressDown::plan(invocation, &hand, feedback)?;
-            Box::new(Run::new(invocation, hand, function))
-        }
-        other => return Err(StartError::UnknownKind { kind: other.into(), known: kinds().join(", ") }),
-    })
+    let Some((_, start)) = KINDS.iter().find(|(kind, _)| *kind == invocation.kind) else {
+        return Err(StartError::UnknownKind { kind: invocation.kind.clone(), known: kinds().join(", ") });
+    };
+    let arm = choose(invocation, robot, feedback);
+    let hand = Hand::for_skill(invocation, robot, feedback, arm);
+    start(invocation, hand, feedback.of_arm(arm).unwrap_or(feedback))
 }

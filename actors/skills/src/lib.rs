@@ -24,16 +24,21 @@
 //! |---|---|
 //! | [`controller`] | [`start`], [`kinds`], what a controller is and why one cannot start |
 //! | `functions` | the function kinds: sequences of primitives with what the hand felt |
-//! | `primitives` | reach, grasp, move, push, release: state machines with intermediate checks |
+//! | `primitives` | the nine (a grasp with fingers or a cup): state machines with intermediate checks |
 //! | [`retreat`](mod@retreat) | the motion home, so that the cameras see the table |
-//! | `run` | performs a function primitive by primitive and writes the report |
-//! | `motion`, `descent`, `clearance`, `geometry`, `hand` | paths, guarded lowering, free space, frames, what the hand felt and was told |
-//!
-//! The hand works pointing down: the TCP's z axis along the world's -z.
+//! | `run`, `sequence` | perform a function primitive by primitive and write the report; a function as a list of steps |
+//! | `arm` | for robots with joints: inverse kinematics, planning round what is perceived, which arm |
+//! | `motion`, `advance` | paths, guarded motion |
+//! | `approach`, `clearance` | approaches from any side and from above, free space |
+//! | `articulation` | joints of doors and drawers, fitted to the way of the hand |
+//! | `geometry`, `hand` | frames, what the hand felt and was told |
 
+mod advance;
+mod approach;
+mod arm;
+mod articulation;
 mod clearance;
 pub mod controller;
-mod descent;
 mod functions;
 mod geometry;
 mod hand;
@@ -41,6 +46,7 @@ mod motion;
 mod primitives;
 pub mod retreat;
 mod run;
+mod sequence;
 
 pub use controller::{Controller, StartError, Tick, kinds, start};
 pub use retreat::{Retreat, RetreatTick, retreat};

@@ -21,16 +21,26 @@ const THERE_M: f64 = 0.005;
 /// A filtered force beyond this during the motion is a collision, newtons.
 const COLLISION_N: f64 = 30.0;
 
-/// A running retreat: straight up to the height of home, level to above it, then to it. Fingers stay as they are.
+/// A running retreat: straight up to the height of home, level to above it, then to it. Fingers stay as they are. Arms go
+/// home one after the other; the one that moved last stays the one that is reported, and so goes last.
 #[derive(Debug)]
 pub struct Retreat {
+    robot: RobotDescription,
+    flight: Flight,
+    /// Arms that are not home yet, the next one last.
+    waiting: Vec<usize>,
+    started: Option<Time>,
+    failure: Option<String>,
+    finished: Option<PrimitiveReport>,
+}
+
+/// One hand on its way home.
+#[derive(Debug)]
+struct Flight {
     hand: Hand,
     path: Path,
     holding: bool,
-    started: Option<Time>,
     settle_ticks: u32,
-    failure: Option<String>,
-    finished: Option<PrimitiveReport>,
 }
 
 /// What a retreat wants.
@@ -60,52 +70,92 @@ pub enum RetreatTick {
 /// }
 /// ```
 pub fn retreat(robot: &RobotDescription, feedback: &Feedback) -> Retreat {
-    let hand = Hand::new(robot, feedback);
-    let holding = holds_something(feedback);
-    let pace = if holding { Pace::carrying(robot) } else { Pace::free(robot) };
-    let heading = robot.home.yaw();
-    let turn = nearest_heading(heading, feedback.tcp.yaw()) - heading;
-    let home = Pose::new(robot.home.translation, DQuat::from_rotation_z(turn) * robot.home.rotation);
-    let path = Path::over(hand.command.tcp, home, home.translation.z, pace, robot.tick_s);
-    Retreat { hand, path, holding, started: None, settle_ticks: 0, failure: None, finished: None }
+    let away = |arm: &usize| {
+        let home = robot.of_arm(*arm).map(|robot| robot.home.translation);
+        let here = feedback.of_arm(*arm).map(|felt| felt.tcp.translation);
+        home.zip(here).is_some_and(|(home, here)| home.distance(here) > THERE_M)
+    };
+    let mut waiting = vec![feedback.arm];
+    waiting.extend((0..robot.arms()).rev().filter(|arm| *arm != feedback.arm).filter(away));
+    let first = waiting.pop().unwrap_or(feedback.arm);
+    let flight = Flight::begin(robot, feedback, first);
+    Retreat { robot: robot.clone(), flight, waiting, started: None, failure: None, finished: None }
 }
 
 impl Retreat {
-    /// Takes the newest feedback and says what to do for the next control tick. Bounded by the path's length.
+    /// Takes the newest feedback and says what to do for the next control tick. Bounded by the paths' lengths.
     pub fn tick(&mut self, feedback: &Feedback) -> RetreatTick {
         self.started.get_or_insert(feedback.time);
-        self.hand.observe(feedback);
         if let Some(report) = &self.finished {
             return RetreatTick::Finished(report.clone());
         }
-        if self.holding && feedback.opening_m < CLOSED_M {
-            self.holding = false;
-            self.failure = Some("what was held was lost on the way: the fingers closed".into());
+        loop {
+            match self.flight.tick(feedback, &mut self.failure) {
+                Some(command) => return RetreatTick::Act(command),
+                None => match self.waiting.pop() {
+                    Some(arm) => self.flight = Flight::begin(&self.robot, feedback, arm),
+                    None => return self.finish(feedback),
+                },
+            }
         }
-        let force_n = self.hand.felt_n().length();
-        if force_n > COLLISION_N {
-            return self.finish(feedback, Some(format!("felt {force_n:.0} N on the way home")));
-        }
-        if let Some(next) = self.path.advance() {
-            self.hand.command.tcp = next;
-            return RetreatTick::Act(self.hand.command());
-        }
-        let distance_m = feedback.tcp.translation.distance(self.path.end().translation);
-        if distance_m < THERE_M {
-            let failure = self.failure.take();
-            return self.finish(feedback, failure);
-        }
-        self.settle_ticks += 1;
-        if self.settle_ticks > self.hand.ticks(SETTLE_S) {
-            return self.finish(feedback, Some(format!("came to rest {:.1} mm from home", 1e3 * distance_m)));
-        }
-        RetreatTick::Act(self.hand.command())
     }
 
-    fn finish(&mut self, feedback: &Feedback, failure: Option<String>) -> RetreatTick {
+    fn finish(&mut self, feedback: &Feedback) -> RetreatTick {
         let started = self.started.unwrap_or(feedback.time);
+        let failure = self.failure.take();
         let report = PrimitiveReport { primitive: Primitive::Reach, started, ended: feedback.time, failure };
         self.finished = Some(report.clone());
         RetreatTick::Finished(report)
+    }
+}
+
+impl Flight {
+    fn begin(robot: &RobotDescription, feedback: &Feedback, arm: usize) -> Flight {
+        let hand = Hand::of_arm(robot, feedback, arm);
+        let feedback = feedback.of_arm(arm).unwrap_or(feedback);
+        let (robot, holding) = (&hand.robot, holds_something(feedback));
+        let pace = if holding { Pace::carrying(robot) } else { Pace::free(robot) };
+        let heading = robot.home.yaw();
+        // Half a turn more or less looks the same to a floating hand; an arm goes home to the joints it waits at.
+        let turn = if robot.arm.is_some() { 0.0 } else { nearest_heading(heading, feedback.tcp.yaw()) - heading };
+        let home = Pose::new(robot.home.translation, DQuat::from_rotation_z(turn) * robot.home.rotation);
+        let path = Path::over(hand.command.tcp, home, home.translation.z, pace, robot.tick_s);
+        Flight { hand, path, holding, settle_ticks: 0 }
+    }
+
+    /// The next command, or `None` when this hand has ended; a failure on the way is noted.
+    fn tick(&mut self, feedback: &Feedback, failure: &mut Option<String>) -> Option<Command> {
+        let feedback = feedback.of_arm(self.hand.command.arm).unwrap_or(feedback);
+        self.hand.observe(feedback);
+        let lost = feedback.opening_m < CLOSED_M && !holds_something(feedback);
+        if self.holding && lost {
+            self.holding = false;
+            failure.get_or_insert("what was held was lost on the way".into());
+        }
+        let force_n = self.hand.felt_n().length();
+        if force_n > COLLISION_N {
+            failure.get_or_insert(format!("felt {force_n:.0} N on the way home"));
+            return None;
+        }
+        if self.hand.follow(&mut self.path) {
+            let command = self.hand.command();
+            return match self.hand.fault() {
+                Some(reason) => {
+                    failure.get_or_insert(reason);
+                    None
+                }
+                None => Some(command),
+            };
+        }
+        let distance_m = feedback.tcp.translation.distance(self.path.end().translation);
+        if distance_m < THERE_M {
+            return None;
+        }
+        self.settle_ticks += 1;
+        if self.settle_ticks > self.hand.ticks(SETTLE_S) {
+            failure.get_or_insert(format!("came to rest {:.1} mm from home", 1e3 * distance_m));
+            return None;
+        }
+        Some(self.hand.command())
     }
 }

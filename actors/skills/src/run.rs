@@ -14,10 +14,15 @@ use acm_concept::{
     skill::{FailureCause, PrimitiveReport, SkillInvocation, SkillReport},
     time::Time,
 };
+use glam::DVec3;
 use std::collections::BTreeMap;
 
 /// Most primitives of one skill: a guard against a function that never ends.
-const MAX_PRIMITIVES: usize = 16;
+const MAX_PRIMITIVES: usize = 24;
+/// How long the fingers may take to open before the hand withdraws from a part that it does not carry, seconds; and
+/// how fast they do, m/s.
+const OPENING_S: f64 = 0.6;
+const OPENING_M_S: f64 = 0.12;
 /// How sure the fingers are that they hold nothing.
 const EMPTY_CONFIDENCE: f64 = 0.95;
 
@@ -25,8 +30,8 @@ const EMPTY_CONFIDENCE: f64 = 0.95;
 pub(crate) trait Function: Send {
     /// The next primitive, given the outcome of the last one; `None` at the beginning.
     fn next(&mut self, hand: &Hand, feedback: &Feedback, last: Option<Outcome>, notes: &mut Notes) -> Next;
-    /// The TCP height to which the hand withdraws after a failure, metres.
-    fn withdraw_height_m(&self) -> f64;
+    /// How the hand withdraws after a failure.
+    fn way_out(&self) -> WayOut;
     /// The object that is, or was to be, in the hand.
     fn object(&self) -> ObjectId;
 }
@@ -36,6 +41,26 @@ pub(crate) enum Next {
     Begin(Box<dyn Primitive>),
     Done,
     Failed(Failure),
+}
+
+impl Next {
+    /// Begins a primitive.
+    pub fn begin(primitive: impl Primitive + 'static) -> Next {
+        Next::Begin(Box::new(primitive))
+    }
+    /// Ends badly.
+    pub fn fail(cause: FailureCause, reason: impl Into<String>) -> Next {
+        Next::Failed(Failure::new(cause, reason.into()))
+    }
+}
+
+/// How a hand withdraws.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum WayOut {
+    /// Straight up to this TCP height, with the fingers as they are; metres.
+    Up(f64),
+    /// Fingers open, then back against the approach direction by so much, metres.
+    Back(f64),
 }
 
 /// What goes into the report besides the primitives.
@@ -75,6 +100,14 @@ struct Running {
     limit_ticks: u32,
 }
 
+/// A withdrawal after a failure.
+struct Withdrawal {
+    /// To what the fingers open first, and for how many ticks at most.
+    opening: Option<(f64, u32)>,
+    way: WayOut,
+    path: Option<Path>,
+}
+
 /// The controller of a function.
 pub(crate) struct Run<F> {
     invocation: SkillInvocation,
@@ -85,7 +118,7 @@ pub(crate) struct Run<F> {
     primitives: Vec<PrimitiveReport>,
     started: Option<Time>,
     failure: Option<(FailureCause, String)>,
-    withdrawal: Option<Path>,
+    withdrawal: Option<Withdrawal>,
     report: Option<Box<SkillReport>>,
 }
 
@@ -120,7 +153,13 @@ impl<F: Function> Run<F> {
                     running.primitive.tick(&mut self.hand, feedback)
                 };
                 match step {
-                    Step::Act => return Tick::Act(self.hand.command()),
+                    Step::Act => {
+                        let command = self.hand.command();
+                        match self.hand.fault() {
+                            Some(reason) => return self.fail(feedback, Failure::new(FailureCause::Motion, reason)),
+                            None => return Tick::Act(command),
+                        }
+                    }
                     Step::Done(outcome) => {
                         self.close_primitive(feedback, None);
                         last = Some(outcome);
@@ -153,24 +192,48 @@ impl<F: Function> Run<F> {
     fn fail(&mut self, feedback: &Feedback, failure: Failure) -> Tick {
         self.close_primitive(feedback, Some(failure.reason.clone()));
         if failure.empty_handed {
+            self.hand.command.vacuum = false;
             self.notes.feel_empty(self.function.object());
         }
         self.failure = Some((failure.cause, failure.reason));
-        let (from, robot) = (self.hand.command.tcp, &self.hand.robot);
-        let height_m = self.function.withdraw_height_m().min(robot.workspace_max.z).max(from.translation.z);
-        self.withdrawal = Some(Path::vertical(from, height_m, Pace::carrying(robot), robot.tick_s));
+        let way = self.function.way_out();
+        let opening = match way {
+            WayOut::Up(_) => None,
+            WayOut::Back(_) => Some((self.hand.robot.max_opening_m, self.hand.ticks(OPENING_S))),
+        };
+        self.withdrawal = Some(Withdrawal { opening, way, path: None });
         self.withdraw(feedback)
     }
 
-    /// Straight up, with the fingers as they are and whatever is felt; as long as the path, and no longer.
+    /// Out of the way whatever is felt; as long as the path, and no longer.
     fn withdraw(&mut self, feedback: &Feedback) -> Tick {
-        match self.withdrawal.as_mut().and_then(Path::advance) {
-            Some(next) => {
-                self.hand.command.tcp = next;
-                Tick::Act(self.hand.command())
+        let Some(withdrawal) = &mut self.withdrawal else { return self.finish(feedback) };
+        if let Some((target_m, ticks)) = &mut withdrawal.opening {
+            let hand = &mut self.hand;
+            hand.command.opening_m = hand.command.opening_m.max(feedback.opening_m.min(hand.robot.max_opening_m));
+            *ticks = ticks.saturating_sub(1);
+            if !hand.turn_opening(*target_m, OPENING_M_S) && *ticks > 0 {
+                let command = hand.command();
+                return if hand.fault().is_none() { Tick::Act(command) } else { self.finish(feedback) };
             }
-            None => self.finish(feedback),
+            withdrawal.opening = None;
         }
+        let (from, robot) = (self.hand.command.tcp, &self.hand.robot);
+        let way = withdrawal.way;
+        let path = withdrawal.path.get_or_insert_with(|| match way {
+            WayOut::Up(height_m) => {
+                let height_m = height_m.min(robot.workspace_max.z).max(from.translation.z);
+                Path::vertical(from, height_m, Pace::carrying(robot), robot.tick_s)
+            }
+            WayOut::Back(distance_m) => {
+                let back = from * Pose::from_translation(-distance_m * DVec3::Z);
+                let inside = back.translation.max(robot.workspace_min).min(robot.workspace_max);
+                Path::through(from, &[Pose::new(inside, from.rotation)], Pace::carrying(robot), robot.tick_s)
+            }
+        });
+        let flying = self.hand.follow(path);
+        let command = self.hand.command();
+        if flying && self.hand.fault().is_none() { Tick::Act(command) } else { self.finish(feedback) }
     }
 
     fn finish(&mut self, feedback: &Feedback) -> Tick {
@@ -196,6 +259,8 @@ impl<F: Function> Controller for Run<F> {
             return Tick::Finished(report.clone());
         }
         self.started.get_or_insert(feedback.time);
+        // At first another arm may have been the last to move.
+        let feedback = feedback.of_arm(self.hand.command.arm).unwrap_or(feedback);
         self.hand.observe(feedback);
         if self.withdrawal.is_some() { self.withdraw(feedback) } else { self.advance(feedback) }
     }

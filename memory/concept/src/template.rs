@@ -136,6 +136,10 @@ pub struct FrameSpec {
     pub name: String,
     position: [Expression; 3],
     yaw: Expression,
+    /// Takes z to the direction out of the part.
+    out: DQuat,
+    /// Turn about that direction, radians.
+    turn: Expression,
 }
 
 /// A manipulation function f of F_tau: a function kind bound to a frame, with conditions and effects.
@@ -330,7 +334,10 @@ impl Template {
     /// A frame of a part with the given parameter values, in its base frame; `None` if there is no such frame.
     pub fn frame(&self, name: &str, values: &Values) -> Result<Option<Pose>, ExpressionError> {
         let Some(spec) = self.frames.iter().find(|frame| frame.name == name) else { return Ok(None) };
-        Ok(Some(Pose::from_yaw(vector(&spec.position, values)?, spec.yaw.evaluate(values)?)))
+        let upright = Pose::from_yaw(vector(&spec.position, values)?, spec.yaw.evaluate(values)?);
+        let turned = spec.out * DQuat::from_rotation_z(spec.turn.evaluate(values)?);
+        let upright_alone = turned == DQuat::IDENTITY;
+        Ok(Some(if upright_alone { upright } else { upright * Pose::new(DVec3::ZERO, turned) }))
     }
     /// The symmetry of a part with the given parameter values.
     pub fn yaw_symmetry(&self, values: &Values) -> Result<YawSymmetry, ExpressionError> {

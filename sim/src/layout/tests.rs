@@ -52,8 +52,8 @@ fn jittered_layouts_keep_their_rules() {
                 // Room for a camera that is mounted a little wrong.
                 let (inner, outer) = (glam::DVec2::splat(8.0), glam::DVec2::new(632.0, 472.0));
                 assert!(pixel.cmpgt(inner).all() && pixel.cmplt(outer).all(), "seed {seed}: mat {i} at {pixel}");
-                assert!(corner.cmpge(scenario.world.workspace[0].with_z(0.0)).all());
-                assert!(corner.cmple(scenario.world.workspace[1]).all());
+                assert!(corner.cmpge(scenario.world.robot.description.workspace_min.with_z(0.0)).all());
+                assert!(corner.cmple(scenario.world.robot.description.workspace_max).all());
             }
         }
     }

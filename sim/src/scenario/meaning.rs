@@ -9,11 +9,12 @@ use super::{
     *,
 };
 use crate::{
-    fluent as state_of, gripper,
+    fluent as state_of,
     mishap::MishapKind,
     model::{ModelLibrary, ObjectModel, is_name},
     oracle,
     random::{DrawKind, DrawSpec, StreamKind},
+    robot,
 };
 use acm_concept::{
     camera::{CameraModel, Intrinsics, MAX_PIXELS, Mount},
@@ -173,17 +174,14 @@ impl<'a> Meaning<'a> {
         if attempts == 0 || attempts > MAX_ATTEMPTS {
             return Err(self.wrong("random.attempts", format!("{attempts} must lie in 1 to {MAX_ATTEMPTS}")));
         }
-        let workspace = raw.robot.workspace.map_or(gripper::WORKSPACE, |[low, high]| [low.into(), high.into()]);
-        let home = raw.robot.home.map_or(gripper::HOME, DVec3::from);
-        if !(home.cmpge(workspace[0]).all() && home.cmple(workspace[1]).all()) {
-            return Err(self.wrong("robot.home", format!("{home} lies outside of the workspace")));
-        }
+        let workspace = raw.robot.workspace.map(|[low, high]| [low.into(), high.into()]);
+        let robot = robot::open(&raw.robot.model, raw.robot.home.map(DVec3::from), workspace)
+            .map_err(|error| self.wrong("robot", error.to_string()))?;
         Ok(WorldSpec {
             surfaces: raw.surface.iter().map(|s| self.surface(s)).collect::<Result<_, _>>()?,
             lighting: raw.light.as_ref().map(|light| self.light(light)).transpose()?,
             cameras: raw.camera.iter().map(|c| self.camera(c)).collect::<Result<_, _>>()?,
-            home,
-            workspace,
+            robot,
             stream: random.map_or(StreamKind::Chacha8, |r| r.stream),
             attempts,
             rejects: random.iter().flat_map(|r| &r.reject).map(|r| self.reject(r, &draws)).collect::<Result<_, _>>()?,

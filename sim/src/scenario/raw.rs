@@ -233,16 +233,24 @@ pub(crate) enum RawMount {
     Hand,
 }
 
-/// The robot: a two-finger hand that floats on a wrist of limited force.
-#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+/// The robot that has the task.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
 pub(crate) struct RawRobot {
-    /// Where the tool centre point waits, metres; the hand looks down. Default: above the back of the table.
-    #[serde(default)]
+    /// Its model: `floating-gripper` (a two-finger hand on a wrist of limited force), `floating-suction` (the same with a
+    /// suction cup), `panda`, `panda-suction` (a 7-joint arm with either), `dual-panda` (two arms with a hand each).
+    pub(crate) model: String,
+    /// Where the tool centre point of a hand without an arm waits, metres; the hand looks down. Default: above the back of
+    /// the table. An arm waits where its model says.
     pub(crate) home: Option<[f64; 3]>,
-    /// Corners of the workspace box, smallest and largest coordinates, metres.
-    #[serde(default)]
+    /// Corners of the workspace box, smallest and largest coordinates, metres. Default: the model's.
     pub(crate) workspace: Option<[[f64; 3]; 2]>,
+}
+
+impl Default for RawRobot {
+    fn default() -> Self {
+        RawRobot { model: "floating-gripper".into(), home: None, workspace: None }
+    }
 }
 
 /// What is random.

@@ -5,6 +5,7 @@ use crate::{
     mishap::MishapKind,
     model::ObjectModel,
     random::{DrawSpec, StreamKind},
+    robot::RobotModel,
 };
 use acm_concept::{
     camera::CameraModel,
@@ -21,8 +22,7 @@ pub(crate) struct WorldSpec {
     /// `None` for the usual lights.
     pub(crate) lighting: Option<LightSpec>,
     pub(crate) cameras: Vec<CameraSpec>,
-    pub(crate) home: DVec3,
-    pub(crate) workspace: [DVec3; 2],
+    pub(crate) robot: RobotModel,
     pub(crate) stream: StreamKind,
     pub(crate) attempts: u32,
     pub(crate) draws: Vec<DrawSpec>,

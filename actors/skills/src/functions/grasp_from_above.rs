@@ -11,7 +11,7 @@ use crate::{
     hand::Hand,
     motion::{Pace, Path},
     primitives::{Carry, Failure, Grasp, GraspPlan, GripWatch, Outcome, Reach},
-    run::{Function, Next, Notes},
+    run::{Function, Next, Notes, WayOut},
 };
 use acm_concept::{
     embodiment::Feedback,
@@ -108,9 +108,10 @@ impl GraspFromAbove {
             support_m,
             approach,
             plan: GraspPlan {
-                height_m: grip_height_m,
+                travel_m: pre_height_m - grip_height_m,
                 width_m: approach.width_m,
-                landed_above_m: 0.5 * (support_m + top_m),
+                landed_before_m: pre_height_m - hand.tip_reach_m - 0.5 * (support_m + top_m),
+                attached: false,
             },
             pre_height_m,
             travel_height_m,
@@ -179,8 +180,8 @@ impl Function for GraspFromAbove {
             (Stage::Grasping { .. }, None) => unexpected(),
         }
     }
-    fn withdraw_height_m(&self) -> f64 {
-        self.carry_height_m
+    fn way_out(&self) -> WayOut {
+        WayOut::Up(self.carry_height_m)
     }
     fn object(&self) -> ObjectId {
         self.object

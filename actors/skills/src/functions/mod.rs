@@ -1,8 +1,28 @@
 //! The function kinds: manipulation functions as sequences of primitives.
 
+mod articulated;
+mod ending;
+mod held;
+
+pub(crate) mod flip;
+pub(crate) mod grasp_along;
 pub(crate) mod grasp_from_above;
+pub(crate) mod hinge_close;
+pub(crate) mod hinge_open;
+pub(crate) mod insert_along;
+pub(crate) mod move_to;
 pub(crate) mod place_upright;
+pub(crate) mod press;
 pub(crate) mod press_down;
+pub(crate) mod pull_along;
+pub(crate) mod push_along;
+pub(crate) mod reach;
+pub(crate) mod release;
+pub(crate) mod rotate;
+pub(crate) mod slide_close;
+pub(crate) mod slide_open;
+pub(crate) mod suck_from_above;
+pub(crate) mod turn;
 
 use crate::{
     controller::StartError,
@@ -23,6 +43,11 @@ pub(crate) fn argument(invocation: &SkillInvocation, name: &'static str) -> Resu
         argument: name,
         got: value.map_or_else(|| "nothing".into(), |value| value.to_string()),
     })
+}
+
+/// A named number that may have any sign; the default where it is not bound or not finite.
+pub(crate) fn number(invocation: &SkillInvocation, name: &str, default: f64) -> f64 {
+    invocation.arguments.get(name).copied().filter(|value| value.is_finite()).unwrap_or(default)
 }
 
 /// Refuses a hand in which something is.

@@ -5,15 +5,16 @@
 //!
 //! Argument: `height`, of what is held over its base, which the hand clears when it leaves; metres.
 
-use super::{PERCEPTION_ERROR_M, argument, within_ceiling};
+use super::{PERCEPTION_ERROR_M, argument, ending, within_ceiling};
 use crate::{
+    approach::Surroundings,
     clearance::{GUARD_M, SAFETY_M, approach_clearance, obstacles, safe_height, within_guarded_reach, within_reach},
     controller::StartError,
     geometry::{downward, points_down},
     hand::{Hand, holds_something, pads_in_contact},
     motion::{Pace, Path},
     primitives::{Carry, Failure, GripWatch, Lower, Outcome, Reach, Release},
-    run::{Function, Next, Notes},
+    run::{Function, Next, Notes, WayOut},
 };
 use acm_concept::{
     embodiment::Feedback,
@@ -26,10 +27,14 @@ use glam::DVec3;
 
 /// How far below the expected contact it is still looked for, metres.
 const SEARCH_M: f64 = 0.018;
+/// An approach direction with more than this along the world's z comes from below, where the support is.
+const UPWARD: f64 = 0.2;
 /// How much the fingers first open, the widest first; metres.
 const SPREADS_M: [f64; 3] = [0.025, 0.018, 0.012];
 /// Room that opening should leave to neighbours, metres.
 const OPENING_ROOM_M: f64 = 0.003;
+/// How far a hand that holds from the side backs off, metres.
+const BACK_M: f64 = 0.1;
 /// Height of the slow rise off what was placed, metres.
 const RISE_M: f64 = 0.03;
 
@@ -56,6 +61,9 @@ pub(crate) struct PlaceUpright {
     gap_m: f64,
     /// The opening kept until the hand is above its neighbours.
     opening_m: f64,
+    /// Whether the hand points down; else it leaves against its approach direction before it rises.
+    down: bool,
+    around: Surroundings,
     stage: Stage,
 }
 
@@ -67,23 +75,31 @@ impl PlaceUpright {
         let place = invocation.destination.ok_or_else(|| StartError::NoDestination { kind: kind() })?;
         let height_m = argument(invocation, "height")?;
         let wanted = place.pose * base_in_tcp.inverse();
-        if !points_down(&wanted) {
-            let tilt_rad = wanted.transform_vector(DVec3::Z).angle_between(-DVec3::Z);
-            return Err(StartError::Tilted { tilt_rad });
+        let down = points_down(&wanted);
+        let approach = wanted.transform_vector(DVec3::Z);
+        if approach.z > UPWARD {
+            return Err(StartError::Tilted { tilt_rad: approach.angle_between(-DVec3::Z) });
         }
-        let rotation = downward(DVec3::ZERO, wanted.yaw()).rotation;
+        // A hand that holds it from the side stays as it is, and leaves to that side.
+        let rotation = if down { downward(DVec3::ZERO, wanted.yaw()).rotation } else { wanted.rotation };
         let contact = Pose::new(place.pose.translation - rotation * base_in_tcp.translation, rotation);
         within_guarded_reach(&hand.robot, "the place", contact.translation)?;
         let above = contact.translation + GUARD_M * DVec3::Z;
         within_reach(&hand.robot, "the pose above the place", above)?;
         let obstacles = obstacles(invocation, place.pose.translation.z);
-        let clearance_m = approach_clearance(&hand.robot, &contact, feedback.opening_m, &obstacles);
+        let around = Surroundings { obstacles: obstacles.clone(), floor_m: place.pose.translation.z };
+        let clearance_m = if down {
+            approach_clearance(&hand.robot, &contact, feedback.opening_m, &obstacles)
+        } else {
+            around.room_between_m(&hand.robot, &Pose::new(above, rotation), &contact, feedback.opening_m)
+        };
         if clearance_m < -PERCEPTION_ERROR_M {
             return Err(StartError::Blocked { what: "put it there", overlap_m: -clearance_m });
         }
         let floor_m = place.pose.translation.z.max(invocation.support_height_m);
         let start = hand.command.tcp.translation;
-        let below_m = base_in_tcp.translation.z;
+        // How far what is held hangs under the TCP.
+        let below_m = contact.translation.z - place.pose.translation.z;
         let travel_height_m = safe_height(hand, start, contact.translation, &obstacles, floor_m, below_m)?;
         let above_top_m = place.pose.translation.z + height_m + hand.tip_reach_m + SAFETY_M;
         Ok(PlaceUpright {
@@ -95,6 +111,8 @@ impl PlaceUpright {
             leave_height_m: within_ceiling(hand, travel_height_m.max(above_top_m)),
             gap_m: feedback.opening_m,
             opening_m: hand.robot.max_opening_m,
+            down,
+            around,
             stage: Stage::Begin,
         })
     }
@@ -126,7 +144,10 @@ impl PlaceUpright {
 
     /// Room to the neighbours with the fingers this wide where the hand is, metres.
     fn room(&self, hand: &Hand, opening_m: f64) -> f64 {
-        approach_clearance(&hand.robot, &hand.command.tcp, opening_m, &self.obstacles)
+        if self.down {
+            return approach_clearance(&hand.robot, &hand.command.tcp, opening_m, &self.obstacles);
+        }
+        self.around.room_m(&hand.robot, &hand.command.tcp, opening_m)
     }
 
     fn rise(&mut self, hand: &Hand, feedback: &Feedback, notes: &mut Notes) -> Next {
@@ -136,6 +157,9 @@ impl PlaceUpright {
             self.opening_m = hand.robot.max_opening_m;
         }
         self.stage = Stage::Rising;
+        if !self.down {
+            return ending::back_off_by(hand, BACK_M);
+        }
         let height_m = within_ceiling(hand, hand.command.tcp.translation.z + RISE_M);
         let path = Path::vertical(hand.command.tcp, height_m, Pace::gentle(&hand.robot), hand.robot.tick_s);
         Next::Begin(Box::new(Reach::passing(path, self.opening_m)))
@@ -182,8 +206,8 @@ impl Function for PlaceUpright {
             Stage::Leaving | Stage::Opening => Next::Done,
         }
     }
-    fn withdraw_height_m(&self) -> f64 {
-        self.leave_height_m
+    fn way_out(&self) -> WayOut {
+        WayOut::Up(self.leave_height_m)
     }
     fn object(&self) -> ObjectId {
         self.object

@@ -11,8 +11,8 @@ use crate::{
     geometry::{downward, nearest_heading},
     hand::Hand,
     motion::{Pace, Path},
-    primitives::{Failure, Outcome, Push, PushPlan, Reach},
-    run::{Function, Next, Notes},
+    primitives::{Failure, Outcome, Press, PressPlan, Reach},
+    run::{Function, Next, Notes, WayOut},
 };
 use acm_concept::{
     embodiment::Feedback,
@@ -53,7 +53,7 @@ pub(crate) struct PressDown {
     object: ObjectId,
     /// TCP pose at which the closed finger tips should touch.
     contact: Pose,
-    plan: PushPlan,
+    plan: PressPlan,
     travel_height_m: f64,
     rise_height_m: f64,
     stage: Stage,
@@ -74,8 +74,8 @@ impl PressDown {
         Ok(PressDown {
             object: invocation.part.object,
             contact,
-            plan: PushPlan {
-                surface_m: at.z,
+            plan: PressPlan {
+                surface_m: GUARD_M,
                 search_m: SEARCH_M,
                 stroke_m,
                 force_n: force_n * (1.0 + HARDER * f64::from(invocation.attempt.min(8))),
@@ -85,21 +85,22 @@ impl PressDown {
             stage: Stage::Begin,
         })
     }
+}
 
-    fn judge(&self, last: Option<Outcome>, notes: &mut Notes) -> Result<(), Failure> {
-        let Some(Outcome::Pushed { force_n, travel_m }) = last else {
-            return Err(Failure::new(FailureCause::Press, "the push ended without a result".into()));
-        };
-        notes.measure("press_force_n", force_n);
-        notes.measure("press_travel_m", travel_m);
-        if travel_m < GAVE_M {
-            let reason = format!("pressed with {force_n:.0} N, but it gave way by only {:.1} mm", 1e3 * travel_m);
-            return Err(Failure::new(FailureCause::Press, reason));
-        }
-        let confidence = if travel_m >= GAVE_SURELY_M { 0.95 } else { 0.75 };
-        notes.feel(Literal::new("pressed", vec![Term::Object(self.object)]), confidence);
-        Ok(())
+/// What a press came to: fails if the thing did not give way.
+pub(crate) fn judge(object: ObjectId, last: Option<Outcome>, notes: &mut Notes) -> Result<(), Failure> {
+    let Some(Outcome::Pushed { force_n, travel_m }) = last else {
+        return Err(Failure::new(FailureCause::Press, "the push ended without a result".into()));
+    };
+    notes.measure("press_force_n", force_n);
+    notes.measure("press_travel_m", travel_m);
+    if travel_m < GAVE_M {
+        let reason = format!("pressed with {force_n:.0} N, but it gave way by only {:.1} mm", 1e3 * travel_m);
+        return Err(Failure::new(FailureCause::Press, reason));
     }
+    let confidence = if travel_m >= GAVE_SURELY_M { 0.95 } else { 0.75 };
+    notes.feel(Literal::new("pressed", vec![Term::Object(object)]), confidence);
+    Ok(())
 }
 
 impl Function for PressDown {
@@ -114,10 +115,10 @@ impl Function for PressDown {
             }
             Stage::Reaching => {
                 self.stage = Stage::Pushing;
-                Next::Begin(Box::new(Push::new(hand, self.plan)))
+                Next::Begin(Box::new(Press::new(hand, self.plan)))
             }
             Stage::Pushing => {
-                if let Err(failure) = self.judge(last, notes) {
+                if let Err(failure) = judge(self.object, last, notes) {
                     return Next::Failed(failure);
                 }
                 self.stage = Stage::Rising;
@@ -129,8 +130,8 @@ impl Function for PressDown {
             Stage::Rising => Next::Done,
         }
     }
-    fn withdraw_height_m(&self) -> f64 {
-        self.rise_height_m
+    fn way_out(&self) -> WayOut {
+        WayOut::Up(self.rise_height_m)
     }
     fn object(&self) -> ObjectId {
         self.object

@@ -2,11 +2,12 @@
 
 use super::{Grip, GripWatch, Outcome, Primitive, Rest, Step, check_collision};
 use crate::{
-    descent::{Descent, Progress},
+    advance::{Advance, Progress},
     hand::Hand,
     motion::Path,
 };
 use acm_concept::{embodiment::Feedback, primitive::Primitive as Kind};
+use glam::DVec3;
 
 /// What is allowed beyond the path's own time, seconds: rest, and pauses where the grip is unsure.
 const SLACK_S: f64 = 4.0;
@@ -18,23 +19,29 @@ const STANDING_N: f64 = 3.5;
 /// Flies a path with something in the hand, then comes to rest and takes its weight as the wrist's zero.
 #[derive(Debug)]
 pub(crate) struct Carry {
+    kind: Kind,
     path: Path,
     watch: GripWatch,
     rest: Rest,
 }
 
 impl Carry {
+    /// A move: from place to place.
     pub fn new(path: Path, watch: GripWatch) -> Carry {
-        Carry { path, watch, rest: Rest::default() }
+        Carry { kind: Kind::Move, path, watch, rest: Rest::default() }
+    }
+    /// A rotation in free air, or a flip: what is held turns with the hand.
+    pub fn turning(kind: Kind, path: Path, watch: GripWatch) -> Carry {
+        Carry { kind, ..Carry::new(path, watch) }
     }
 }
 
 impl Primitive for Carry {
     fn kind(&self) -> Kind {
-        Kind::Move
+        self.kind
     }
     fn limit_s(&self) -> f64 {
-        self.path.duration_s() + SLACK_S
+        self.path.longest_s() + SLACK_S
     }
     fn tick(&mut self, hand: &mut Hand, feedback: &Feedback) -> Step {
         let grip = self.watch.check(hand, feedback);
@@ -44,8 +51,7 @@ impl Primitive for Carry {
             Ok(Grip::Unsure) => return Step::Act,
             Ok(Grip::Shifted) => self.path.restart(hand.command.tcp),
         }
-        if let Some(next) = self.path.advance() {
-            hand.command.tcp = next;
+        if hand.follow(&mut self.path) {
             return Step::Act;
         }
         if self.rest.tick(hand, feedback) { Step::Done(Outcome::Arrived) } else { Step::Act }
@@ -55,16 +61,17 @@ impl Primitive for Carry {
 /// Lowers what is held until it stands on something, or a floor is reached. Ends with the wrist relaxed.
 #[derive(Debug)]
 pub(crate) struct Lower {
-    descent: Descent,
+    advance: Advance,
     watch: GripWatch,
     limit_s: f64,
 }
 
 impl Lower {
-    /// Down to a TCP height of `floor_m` at most. The wrist's zero must have been taken at rest.
+    /// Straight down to a TCP height of `floor_m` at most. The wrist's zero must have been taken at rest.
     pub fn new(hand: &Hand, floor_m: f64, watch: GripWatch) -> Lower {
-        let descent = Descent::new(hand, floor_m, LOWERING_M_S, STANDING_N);
-        Lower { limit_s: descent.duration_s(hand.command.tcp.translation.z) + SLACK_S, descent, watch }
+        let travel_m = hand.command.tcp.translation.z - floor_m;
+        let advance = Advance::new(hand, -DVec3::Z, travel_m, LOWERING_M_S, STANDING_N);
+        Lower { limit_s: advance.duration_s() + SLACK_S, advance, watch }
     }
 }
 
@@ -83,15 +90,15 @@ impl Primitive for Lower {
             Ok(Grip::Firm | Grip::Shifted) => {}
         }
         let height_m = feedback.tcp.translation.z;
-        match self.descent.tick(hand) {
-            Progress::Down => Step::Act,
+        match self.advance.tick(hand) {
+            Progress::Onward => Step::Act,
             Progress::Touched => {
                 // The spring of the wrist is let go, so that opening the fingers does not shoot the object away.
                 let touch_n = Some(hand.felt_n().z);
                 hand.command_height(height_m);
                 Step::Done(Outcome::Lowered { touch_n, height_m })
             }
-            Progress::Floor => Step::Done(Outcome::Lowered { touch_n: None, height_m }),
+            Progress::End => Step::Done(Outcome::Lowered { touch_n: None, height_m }),
         }
     }
 }

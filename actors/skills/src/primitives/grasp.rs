@@ -1,20 +1,21 @@
-//! Grasp: lower the open fingers on both sides of a part and close them on it.
+//! Grasp: bring the open fingers to both sides of a part along the hand's approach direction and close them on it.
 
 use super::{Failure, Outcome, Primitive, Step, check_collision};
 use crate::{
-    descent::{Descent, Progress},
+    advance::{Advance, Progress},
     hand::{CLOSED_M, Hand, pads_in_contact},
     motion::{Pace, Path},
 };
-use acm_concept::{embodiment::Feedback, primitive::Primitive as Kind, skill::FailureCause};
+use acm_concept::{embodiment::Feedback, pose::Pose, primitive::Primitive as Kind, skill::FailureCause};
+use glam::DVec3;
 use std::collections::VecDeque;
 
-/// Speed of lowering the open fingers, m/s.
-const LOWERING_M_S: f64 = 0.05;
-/// Upward force that tells that the fingers stand on something, newtons.
+/// Speed of the open fingers on their way to the part, m/s.
+const APPROACH_M_S: f64 = 0.05;
+/// Force against the approach that tells that the finger tips touch something, newtons.
 const TOUCH_N: f64 = 4.0;
-/// How far the hand is lifted off what it touched before the fingers close, metres.
-const LIFT_OFF_M: f64 = 0.003;
+/// How far the hand is drawn back from what it touched before the fingers close, metres.
+const BACK_OFF_M: f64 = 0.003;
 /// Speed at which the commanded opening closes, m/s: an object off the middle is shoved, not knocked.
 const CLOSING_M_S: f64 = 0.12;
 /// Force of closing, newtons: the width is measured before the full force dents pads or part.
@@ -30,24 +31,31 @@ const WIDER_M: f64 = 0.02;
 const PUSHING_M: f64 = 0.003;
 /// How long one pad may wait for the other, seconds.
 const ONE_SIDED_S: f64 = 0.3;
+/// How fast the hand yields to a part that does not follow the fingers: m/s for a newton, and at most; m/s.
+const YIELDING_M_S_N: f64 = 0.005;
+const YIELDING_M_S: f64 = 0.04;
 /// What closing may take, seconds.
 const CLOSING_LIMIT_S: f64 = 2.0;
 
 /// The numbers of a grasp.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct GraspPlan {
-    /// TCP height at which the fingers close, metres.
-    pub height_m: f64,
+    /// How far the TCP goes along the approach direction before the fingers close, metres.
+    pub travel_m: f64,
     /// Perceived distance between the faces that the fingers close on, metres.
     pub width_m: f64,
-    /// Tips that touch above this height have landed on the part or a neighbour, not on the support; metres.
-    pub landed_above_m: f64,
+    /// Tips that touch before the TCP has gone this far have landed on the part or a neighbour, not on what is
+    /// behind it; metres.
+    pub landed_before_m: f64,
+    /// Whether the part belongs to something that does not follow the fingers, as a handle does: then the hand
+    /// follows the part instead.
+    pub attached: bool,
 }
 
 #[derive(Debug)]
 enum Phase {
-    Lower(Descent),
-    LiftOff(Path),
+    Approach(Advance),
+    BackOff(Path),
     /// Gently, until the gap stalls.
     Close {
         gaps: Stall,
@@ -84,6 +92,8 @@ impl Stall {
 #[derive(Debug)]
 pub(crate) struct Grasp {
     plan: GraspPlan,
+    start: DVec3,
+    along: DVec3,
     open_m: f64,
     phase: Phase,
     touched: bool,
@@ -92,19 +102,34 @@ pub(crate) struct Grasp {
 
 impl Grasp {
     pub fn new(hand: &Hand, plan: GraspPlan) -> Grasp {
-        let descent = Descent::new(hand, plan.height_m, LOWERING_M_S, TOUCH_N);
-        let limit_s = descent.duration_s(hand.command.tcp.translation.z) + CLOSING_LIMIT_S;
-        Grasp { plan, open_m: hand.command.opening_m, phase: Phase::Lower(descent), touched: false, limit_s }
+        let start = hand.command.tcp;
+        let along = start.transform_vector(DVec3::Z);
+        let advance = Advance::new(hand, along, plan.travel_m, APPROACH_M_S, TOUCH_N);
+        let limit_s = advance.duration_s() + CLOSING_LIMIT_S;
+        let open_m = hand.command.opening_m;
+        Grasp {
+            plan,
+            start: start.translation,
+            along,
+            open_m,
+            phase: Phase::Approach(advance),
+            touched: false,
+            limit_s,
+        }
     }
 
     fn close(&mut self, hand: &mut Hand, feedback: &Feedback) -> Step {
         let Phase::Close { gaps, one_sided_ticks } = &mut self.phase else { return Step::Act };
         let gap_m = feedback.opening_m;
-        if gap_m < CLOSED_M {
+        // A thin handle is narrower than what counts as closed fingers elsewhere.
+        if gap_m < CLOSED_M.min(0.5 * self.plan.width_m) {
             return Step::Failed(nothing(format!("the fingers closed on nothing: the gap is {:.1} mm", 1e3 * gap_m)));
         }
         hand.command.grip_force_n = CLOSING_N.min(hand.robot.max_grip_force_n);
         hand.turn_opening(0.0, CLOSING_M_S);
+        if self.plan.attached {
+            follow_part(hand);
+        }
         let pushing = feedback.commanded_opening_m < gap_m - PUSHING_M;
         if !(gaps.reached(hand, gap_m) && pushing) {
             return Step::Act;
@@ -140,32 +165,38 @@ impl Primitive for Grasp {
             return Step::Failed(failure);
         }
         match &mut self.phase {
-            Phase::Lower(descent) => match descent.tick(hand) {
-                Progress::Down => {}
-                Progress::Floor => self.phase = closing(),
+            Phase::Approach(advance) => match advance.tick(hand) {
+                Progress::Onward => {}
+                Progress::End => self.phase = closing(),
                 Progress::Touched => {
-                    let tip_m = hand.tip_height_m(&feedback.tcp);
-                    if tip_m > self.plan.landed_above_m {
+                    let gone_m = (feedback.tcp.translation - self.start).dot(self.along);
+                    if gone_m < self.plan.landed_before_m {
                         let reason = format!(
-                            "the fingers landed on something {:.1} mm above where they may",
-                            1e3 * (tip_m - self.plan.landed_above_m)
+                            "the fingers landed on something {:.1} mm before where they may",
+                            1e3 * (self.plan.landed_before_m - gone_m)
                         );
                         return Step::Failed(nothing(reason));
                     }
                     self.touched = true;
-                    let off_m = feedback.tcp.translation.z + LIFT_OFF_M;
+                    // Off what was touched: from where the hand is, not from where a yielding wrist was told to be.
+                    let off_m = gone_m - BACK_OFF_M - advance.gone_m();
+                    let to = hand.command.tcp.translation + off_m * self.along;
+                    let to = [Pose::new(to, hand.command.tcp.rotation)];
                     let pace = Pace::gentle(&hand.robot);
-                    self.phase = Phase::LiftOff(Path::vertical(hand.command.tcp, off_m, pace, hand.robot.tick_s));
+                    self.phase = Phase::BackOff(Path::through(hand.command.tcp, &to, pace, hand.robot.tick_s));
                 }
             },
-            Phase::LiftOff(path) => match path.advance() {
+            Phase::BackOff(path) => match path.advance() {
                 Some(next) => hand.command.tcp = next,
                 None => self.phase = closing(),
             },
             Phase::Close { .. } => return self.close(hand, feedback),
             Phase::Squeeze { gaps, width_m } => {
+                if self.plan.attached {
+                    follow_part(hand);
+                }
                 let (gap_m, width_m) = (feedback.opening_m, *width_m);
-                if gap_m < CLOSED_M {
+                if gap_m < CLOSED_M.min(0.5 * width_m) {
                     return Step::Failed(nothing("the object slipped out when it was squeezed".into()));
                 }
                 if gaps.reached(hand, gap_m) {
@@ -182,6 +213,13 @@ impl Primitive for Grasp {
         }
         Step::Act
     }
+}
+
+/// Lets the hand yield along the direction in which the fingers close, so that both pads bear alike.
+fn follow_part(hand: &mut Hand) {
+    let across = hand.command.tcp.transform_vector(DVec3::Y);
+    let speed_m_s = (YIELDING_M_S_N * hand.felt_n().dot(across)).clamp(-YIELDING_M_S, YIELDING_M_S);
+    hand.command.tcp.translation += speed_m_s * hand.robot.tick_s * across;
 }
 
 fn closing() -> Phase {

@@ -1,20 +1,26 @@
 //! The primitives: small state machines with intermediate checks and an outcome.
 
 mod carry;
+mod follow;
 mod grasp;
 mod grip;
-mod push;
+mod insert;
+mod press;
 mod reach;
 mod release;
+mod suck;
 
 pub(crate) use carry::{Carry, Lower};
+pub(crate) use follow::{Follow, FollowPlan, Hold};
 pub(crate) use grasp::{Grasp, GraspPlan};
 pub(crate) use grip::{Grip, GripWatch};
-pub(crate) use push::{Push, PushPlan};
+pub(crate) use insert::{Insert, InsertPlan};
+pub(crate) use press::{Press, PressPlan};
 pub(crate) use reach::Reach;
 pub(crate) use release::Release;
+pub(crate) use suck::Suck;
 
-use crate::hand::Hand;
+use crate::{articulation::Articulation, hand::Hand};
 use acm_concept::{embodiment::Feedback, pose::Pose, primitive::Primitive as Kind, skill::FailureCause};
 use glam::DVec3;
 use std::collections::VecDeque;
@@ -62,6 +68,11 @@ pub(crate) enum Outcome {
     Grasped { width_m: f64, gap_m: f64, tcp: Pose, touched: bool },
     /// The greatest force, and how far the hand went on after the first touch.
     Pushed { force_n: f64, travel_m: f64 },
+    /// How far the part went, metres or radians, the joint as its way told it, the greatest force along the way, and
+    /// whether the part stopped by itself.
+    Followed { travelled: f64, joint: Articulation, resistance_n: f64, stopped: bool },
+    /// How deep what was held went in, how far off the opening was searched for, and the greatest force.
+    Inserted { depth_m: f64, searched_m: f64, force_n: f64 },
     /// The fingers are open; whether both pads are free.
     Released { free: bool },
 }

@@ -3,6 +3,7 @@
 use super::*;
 use crate::expression::Expression;
 use serde::Deserialize;
+use std::f64::consts::{FRAC_PI_2, PI};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -84,6 +85,47 @@ struct RawFrame {
     position: [String; 3],
     #[serde(default = "zero")]
     yaw: String,
+    /// The axis of the part's frame along which this frame's z axis points.
+    #[serde(default = "up")]
+    out: RawOut,
+    #[serde(default = "zero")]
+    turn: String,
+}
+
+/// A direction out of a part.
+#[derive(Clone, Copy, Deserialize)]
+enum RawOut {
+    #[serde(rename = "x")]
+    X,
+    #[serde(rename = "-x")]
+    MinusX,
+    #[serde(rename = "y")]
+    Y,
+    #[serde(rename = "-y")]
+    MinusY,
+    #[serde(rename = "z")]
+    Z,
+    #[serde(rename = "-z")]
+    MinusZ,
+}
+
+impl RawOut {
+    /// The rotation that takes z to this axis and leaves y level.
+    fn rotation(self) -> DQuat {
+        let over = DQuat::from_rotation_y(FRAC_PI_2);
+        match self {
+            RawOut::X => over,
+            RawOut::MinusX => DQuat::from_rotation_z(PI) * over,
+            RawOut::Y => DQuat::from_rotation_z(FRAC_PI_2) * over,
+            RawOut::MinusY => DQuat::from_rotation_z(-FRAC_PI_2) * over,
+            RawOut::Z => DQuat::IDENTITY,
+            RawOut::MinusZ => DQuat::from_rotation_y(PI),
+        }
+    }
+}
+
+fn up() -> RawOut {
+    RawOut::Z
 }
 
 #[derive(Deserialize)]
@@ -305,7 +347,8 @@ impl Meaning<'_> {
     fn frame(&self, raw: &RawFrame) -> Result<FrameSpec, TemplateError> {
         let place = format!("frame `{}`", raw.name);
         let (position, yaw) = (self.triple(&place, &raw.position)?, self.expression(&place, &raw.yaw)?);
-        Ok(FrameSpec { name: raw.name.clone(), position, yaw })
+        let (out, turn) = (raw.out.rotation(), self.expression(&place, &raw.turn)?);
+        Ok(FrameSpec { name: raw.name.clone(), position, yaw, out, turn })
     }
 
     fn rest(&self, raw: &RawRest) -> Result<Rest, TemplateError> {

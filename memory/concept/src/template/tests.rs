@@ -58,6 +58,22 @@ fn a_template_is_read_and_evaluated() {
 }
 
 #[test]
+fn a_frame_may_look_out_of_any_side() {
+    let axes =
+        [("x", DVec3::X), ("-x", -DVec3::X), ("y", DVec3::Y), ("-y", -DVec3::Y), ("z", DVec3::Z), ("-z", -DVec3::Z)];
+    for (name, out) in axes {
+        let text = PUCK.replace("name = \"top\"", &format!("name = \"top\"\nout = \"{name}\""));
+        let puck = Template::parse("puck.toml", &text).unwrap();
+        let frame = puck.frame("top", &puck.named(&[0.03, 0.02])).unwrap().unwrap();
+        assert!(frame.transform_vector(DVec3::Z).distance(out) < 1e-12, "{name}");
+        // Fingers that close along y close level, unless a turn says otherwise.
+        assert!(frame.transform_vector(DVec3::Y).z.abs() < 1e-12, "{name}");
+    }
+    let wrong = PUCK.replace("name = \"top\"", "name = \"top\"\nout = \"up\"");
+    assert!(Template::parse("puck.toml", &wrong).unwrap_err().to_string().contains("-x"));
+}
+
+#[test]
 fn mistakes_are_named() {
     let error = |from: &str, to: &str| Template::parse("puck.toml", &PUCK.replace(from, to)).unwrap_err().to_string();
     assert!(error("seen_by", "sen_by").contains("did you mean `seen_by`"));

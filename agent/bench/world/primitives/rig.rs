@@ -1,0 +1,181 @@
+//! A small world for one try of a skill: scenario text in, skills run on its robot, truth read off.
+
+use acm_concept::{
+    color::{Appearance, Lab},
+    embodiment::{Embodiment, Feedback},
+    ids::{ObjectId, PartId},
+    literal::Place,
+    object::{GroundedPart, PoseEstimate},
+    pose::Pose,
+    skill::{SkillInvocation, SkillReport},
+    solid::PlacedSolid,
+};
+use acm_sim::{Scenario, SimOptions, Simulation, TrueObject};
+use acm_skills::{RetreatTick, Tick, retreat, start};
+use anyhow::{Context, Result, bail};
+use glam::DVec3;
+use std::collections::BTreeMap;
+
+/// Height of the table's top, metres.
+pub const TABLE_M: f64 = 0.74;
+/// More ticks than any skill may take: two minutes.
+const MAX_TICKS: usize = 6000;
+
+/// A world with a robot in it.
+pub struct Rig {
+    pub simulation: Simulation,
+    robot: Box<dyn Embodiment>,
+    /// Greatest force at the wrist so far, newtons.
+    pub most_n: f64,
+}
+
+/// The text of a scenario whose world is a table, the given models and objects, and a robot with a roomy workspace.
+pub fn scenario(models: &str, objects: &str, friction: f64) -> String {
+    let low = DVec3::new(-1.4, -1.4, TABLE_M + 0.003);
+    scenario_on(models, objects, friction, TABLE_M, DVec3::new(0.0, 0.0, 1.3), [low, DVec3::new(1.4, 1.4, 2.2)])
+}
+
+/// As [`scenario`], on a ground of another height, with the hand's home and the corners of its workspace.
+pub fn scenario_on(
+    models: &str,
+    objects: &str,
+    friction: f64,
+    ground_m: f64,
+    home: DVec3,
+    [low, high]: [DVec3; 2],
+) -> String {
+    format!(
+        r##"scenario = "rig"
+summary = "a world for one try of a skill"
+[task]
+instruction = "nothing is asked"
+[task.budgets]
+seconds = 1000.0
+skills = 100
+frames = 1
+[[surface]]
+name = "ground"
+size = [6.0, 6.0, 0.05]
+position = [0.0, 0.0, {}]
+color = "#ffffff"
+friction = {friction}
+support = true
+[[camera]]
+name = "none"
+position = [0.0, -1.0, 1.5]
+forward = [0.0, 0.6, -0.8]
+left = [-1.0, 0.0, 0.0]
+fov_y_deg = 50.0
+[robot]
+home = {home}
+workspace = [{low}, {high}]
+[[judge.strict.stage]]
+name = "never"
+when = "time > 1000000"
+{models}
+{objects}
+"##,
+        ground_m - 0.025,
+    )
+}
+
+impl Rig {
+    /// Builds a world and lets it settle.
+    pub fn new(text: &str, seed: u64) -> Result<Rig> {
+        let scenario = Scenario::parse("rig.toml", text)?;
+        let options = SimOptions { seed, ..SimOptions::default() };
+        let simulation = Simulation::without_renderer(&scenario, &options)?;
+        let robot = simulation.embodiment();
+        Ok(Rig { simulation, robot, most_n: 0.0 })
+    }
+    /// An object as it truly is.
+    pub fn object(&self, name: &str) -> Result<TrueObject> {
+        let found = self.simulation.truth().into_iter().find(|object| object.name == name);
+        found.with_context(|| format!("the rig has no object `{name}`"))
+    }
+    /// What the robot measures.
+    pub fn feedback(&self) -> Feedback {
+        self.robot.feedback()
+    }
+    /// Runs a skill to its end; what refuses to start is a report too.
+    pub fn run(&mut self, invocation: &SkillInvocation) -> Result<SkillReport, String> {
+        let started = start(invocation, self.robot.description(), &self.robot.feedback());
+        let mut controller = started.map_err(|error| format!("refused: {error}"))?;
+        for _ in 0..MAX_TICKS {
+            match controller.tick(&self.robot.feedback()) {
+                Tick::Act(command) => {
+                    let felt = self.robot.command(&command).map_err(|error| format!("the robot: {error}"))?;
+                    self.most_n = self.most_n.max(felt.wrist_force_n.length());
+                }
+                Tick::Finished(report) => return Ok(*report),
+            }
+        }
+        Err("the skill did not end".into())
+    }
+    /// As [`Rig::run`]; a skill that failed is an error with its reason.
+    pub fn done(&mut self, invocation: &SkillInvocation) -> Result<SkillReport, String> {
+        let report = self.run(invocation)?;
+        match &report.failure {
+            None => Ok(report),
+            Some((cause, reason)) => Err(format!("{}: {reason}", cause.word())),
+        }
+    }
+    /// Sends the hand home.
+    pub fn go_home(&mut self) -> Result<()> {
+        let mut retreat = retreat(self.robot.description(), &self.robot.feedback());
+        for _ in 0..MAX_TICKS {
+            match retreat.tick(&self.robot.feedback()) {
+                RetreatTick::Act(command) => {
+                    self.robot.command(&command)?;
+                }
+                RetreatTick::Finished(_) => return Ok(()),
+            }
+        }
+        bail!("the retreat did not end")
+    }
+    /// Lets the world go on for a while.
+    pub fn wait(&mut self, seconds: f64) -> Result<()> {
+        let mut clock = self.simulation.clock();
+        let now = clock.now();
+        let until = acm_concept::time::Time(now.0 + (seconds * 1e9) as u64);
+        clock.wait_until(until)?;
+        Ok(())
+    }
+}
+
+/// A skill at a frame, with everything else empty.
+pub fn invocation(kind: &str, object: ObjectId, base: Pose, frame: Pose, arguments: &[(&str, f64)]) -> SkillInvocation {
+    SkillInvocation {
+        skill: kind.into(),
+        entry: None,
+        kind: kind.into(),
+        part: PartId { object, index: 0 },
+        target: part(base),
+        frame,
+        arguments: arguments.iter().map(|(name, value)| ((*name).to_string(), *value)).collect::<BTreeMap<_, _>>(),
+        destination: None,
+        obstacles: Vec::<(ObjectId, PlacedSolid)>::new(),
+        support_height_m: TABLE_M,
+        held: None,
+        held_solids: vec![],
+        attempt: 0,
+    }
+}
+
+/// A place for the base of what is held.
+pub fn place(pose: Pose) -> Option<Place> {
+    Some(Place { support: None, pose, tolerance_m: 0.01 })
+}
+
+/// A part of which nothing but the pose is known.
+pub fn part(pose: Pose) -> GroundedPart {
+    GroundedPart {
+        template: "box".into(),
+        name: "whole".into(),
+        parameters: vec![],
+        pose: PoseEstimate { pose, position_sigma_m: DVec3::splat(0.001), yaw_sigma_rad: 0.01 },
+        affordances: vec![],
+        functions: vec![],
+        appearance: Appearance { mean: Lab { l: 50.0, a: 0.0, b: 0.0 }, spread: 2.0 },
+    }
+}
