@@ -44,13 +44,20 @@ pub(crate) struct Articulation {
 }
 
 impl Articulation {
-    /// Joins two bodies whose frames lie on each other when the joint is at zero.
+    /// Joins two bodies whose frames lie on each other when the joint is at zero. `middle` is about the child's centre of
+    /// mass: a light part that is held far from there is more than the solver can do.
     pub(crate) fn insert(
         world: &mut PhysicsWorld,
         parent: RigidBodyHandle,
         child: RigidBodyHandle,
         joint: &Joint,
+        middle: DVec3,
     ) -> Articulation {
+        let anchor = match joint.kind {
+            JointKind::Slider => middle,
+            JointKind::Hinge => joint.origin + joint.axis * (middle - joint.origin).dot(joint.axis),
+        };
+        let joint = &Joint { origin: anchor, ..joint.clone() };
         let middle = match (joint.kind, joint.range) {
             (JointKind::Hinge, Some([low, high])) => 0.5 * (low + high),
             _ => 0.0,

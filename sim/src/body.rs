@@ -74,7 +74,7 @@ impl Body {
         };
         self.colliders.extend(insert_pieces(world, link, carrier));
         if let Some(joint) = &link.joint {
-            self.joints.push((at, Articulation::insert(world, parent, carrier, joint)));
+            self.joints.push((at, Articulation::insert(world, parent, carrier, joint, middle(link))));
         }
         self.carriers.push(carrier);
     }
@@ -177,19 +177,23 @@ impl Body {
     }
 }
 
-/// What a link has besides the mass of what is felt of it: the joint's armature, and 10 g for one that is only seen, such
-/// as a burner's glow.
-fn inertia(link: &Link, joint: &Joint, armature: f64) -> MassProperties {
+/// The middle of a link's pieces, in its frame.
+fn middle(link: &Link) -> DVec3 {
     let start = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     let bounds = link.pieces.iter().map(|piece| piece.bounds(&Pose::IDENTITY));
     let (low, high) = bounds.fold(start, |a, b| (a.0.min(b.0), a.1.max(b.1)));
-    let middle = if low.is_finite() { vector(0.5 * (low + high)) } else { Vector::ZERO };
+    if low.is_finite() { 0.5 * (low + high) } else { DVec3::ZERO }
+}
+
+/// What a link has besides the mass of what is felt of it: the joint's armature, and 10 g for one that is only seen, such
+/// as a burner's glow.
+fn inertia(link: &Link, joint: &Joint, armature: f64) -> MassProperties {
     let (ghost_kg, ghost_kg_m2) = if link.volume() > 0.0 { (0.0, 0.0) } else { (0.01, 1e-5) };
     let (mass, turn) = match joint.kind {
         JointKind::Hinge => (ghost_kg, ghost_kg_m2 + armature),
         JointKind::Slider => (ghost_kg + armature, ghost_kg_m2),
     };
-    MassProperties::new(middle, mass as f32, Vector::splat(turn as f32))
+    MassProperties::new(vector(middle(link)), mass as f32, Vector::splat(turn as f32))
 }
 
 fn insert_pieces(world: &mut PhysicsWorld, link: &Link, body: RigidBodyHandle) -> Vec<ColliderHandle> {
