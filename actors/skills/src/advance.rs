@@ -33,7 +33,14 @@ impl Advance {
     /// that is nearer, unless the wrist feels `touch_n` against the motion before.
     pub fn new(hand: &Hand, direction: DVec3, travel_m: f64, speed_m_s: f64, touch_n: f64) -> Advance {
         let room_m = room(hand, direction);
-        Advance { direction, travel_m: travel_m.min(room_m).max(0.0), gone_m: 0.0, speed_m_s, touch_n, current_m_s: 0.0 }
+        Advance {
+            direction,
+            travel_m: travel_m.min(room_m).max(0.0),
+            gone_m: 0.0,
+            speed_m_s,
+            touch_n,
+            current_m_s: 0.0,
+        }
     }
     /// One tick; the filter of the hand must already hold the newest reading.
     pub fn tick(&mut self, hand: &mut Hand) -> Progress {

@@ -8,7 +8,11 @@ use crate::{
     hand::Hand,
     motion::{Pace, Path},
 };
-use acm_concept::{embodiment::RobotDescription, pose::Pose, solid::{PlacedSolid, Solid}};
+use acm_concept::{
+    embodiment::RobotDescription,
+    pose::Pose,
+    solid::{PlacedSolid, Solid},
+};
 use glam::{DQuat, DVec3};
 use std::f64::consts::PI;
 
@@ -78,9 +82,8 @@ impl Surroundings {
             let share = (at - from).dot(along) / along.length_squared().max(1e-12);
             at.distance(from + share.clamp(0.0, 1.0) * along)
         };
-        let is_near = |solid: &&PlacedSolid| {
-            nearest(solid.pose.translation) < distance_m + solid.solid.bounding_radius()
-        };
+        let is_near =
+            |solid: &&PlacedSolid| nearest(solid.pose.translation) < distance_m + solid.solid.bounding_radius();
         Surroundings { obstacles: self.obstacles.iter().filter(is_near).copied().collect(), floor_m: self.floor_m }
     }
     /// The height that clears everything.
@@ -132,9 +135,8 @@ pub(crate) fn choose(
 pub(crate) fn way(hand: &Hand, to: Pose, around: &Surroundings, pace: Pace) -> Path {
     let (from, robot) = (hand.command.tcp, &hand.robot);
     let opening_m = hand.command.opening_m.max(0.5 * robot.max_opening_m);
-    let inside = |pose: Pose| {
-        Pose::new(pose.translation.max(robot.workspace_min).min(robot.workspace_max), pose.rotation)
-    };
+    let inside =
+        |pose: Pose| Pose::new(pose.translation.max(robot.workspace_min).min(robot.workspace_max), pose.rotation);
     let before = VIA_M.map(|distance_m| inside(drawn_back(&to, distance_m)));
     let level_m = from.translation.z.max(to.translation.z);
     let clear_m = (around.top_m() + hand_radius_m(robot) + SAFETY_M).max(level_m);
@@ -184,7 +186,8 @@ fn surface(part: &PlacedSolid) -> Vec<DVec3> {
                 if inner(i, counts[0]) && inner(j, counts[1]) && inner(k, counts[2]) {
                     continue;
                 }
-                let mut point = DVec3::new(at(i, counts[0], half.x), at(j, counts[1], half.y), at(k, counts[2], half.z));
+                let mut point =
+                    DVec3::new(at(i, counts[0], half.x), at(j, counts[1], half.y), at(k, counts[2], half.z));
                 if let Solid::Cylinder { radius, .. } = part.solid {
                     let flat = point.truncate().clamp_length_max(radius);
                     point = flat.extend(point.z);

@@ -138,7 +138,12 @@ mod tests {
     use proptest::prelude::*;
 
     fn arc(centre: DVec3, radius: f64, angle: f64) -> Vec<DVec3> {
-        (0..=30).map(|i| centre + radius * DVec3::new((angle * f64::from(i) / 30.0).cos(), (angle * f64::from(i) / 30.0).sin(), 0.0)).collect()
+        (0..=30)
+            .map(|i| {
+                centre
+                    + radius * DVec3::new((angle * f64::from(i) / 30.0).cos(), (angle * f64::from(i) / 30.0).sin(), 0.0)
+            })
+            .collect()
     }
 
     proptest! {

@@ -45,6 +45,9 @@ const PALM_M: DVec2 = DVec2::new(0.108, 0.038);
 const FINGERS_M: f64 = 0.04;
 /// The height of things that are not tall, metres: the hand must get under their handles.
 const RAISED_M: f64 = 0.7;
+/// The hand waits at this height, or so much over the thing: it goes home over doors that stand open; metres.
+const HOME_M: f64 = 1.3;
+const OVER_M: f64 = 0.4;
 /// What is higher than this stands near the ground, metres: some doors reach below their foot.
 const TALL_M: f64 = 0.75;
 const GROUND_M: f64 = 0.05;
@@ -80,8 +83,12 @@ pub fn measure(args: &BenchArgs, result: &mut BenchResult) -> Result<()> {
         for swing in run_model(model)? {
             tried += usize::from(shared);
             good += usize::from(shared && swing.good());
-            let values =
-                [("opened", swing.opened), ("left", swing.left), ("most_n", swing.most_n), ("good", f64::from(u8::from(swing.good())))];
+            let values = [
+                ("opened", swing.opened),
+                ("left", swing.left),
+                ("most_n", swing.most_n),
+                ("good", f64::from(u8::from(swing.good()))),
+            ];
             let group = if shared { "articulated" } else { "articulated, own" };
             result.rows.push(Row { group: Some(group.into()), ..Row::new(swing.name.as_str(), values) });
             result.notes.extend(swing.failure.map(|why| format!("{}: {why}", swing.name)));
@@ -105,8 +112,9 @@ pub struct Swing {
     pub is_hinge: bool,
     /// How far it can go, radians or metres.
     pub way: f64,
-    /// The share of it that it stood open, and that it was left open in the end.
+    /// The share of it that it stood open.
     pub opened: f64,
+    /// The share of it that it was left open in the end.
     pub left: f64,
     /// Greatest force at the wrist, newtons.
     pub most_n: f64,
@@ -154,9 +162,9 @@ pub fn models(data: Option<&Path>) -> Vec<String> {
 /// # Errors
 /// The world cannot be built.
 pub fn run_model(model: &str) -> Result<Vec<Swing>> {
-    let plain = Rig::new(&world(model, 0.0), 0)?.object("thing")?;
+    let plain = Rig::new(&world(model, 0.0, 0.0), 0)?.object("thing")?;
     let height_m = if plain.size_m.z > TALL_M { GROUND_M } else { RAISED_M };
-    let text = world(model, height_m);
+    let text = world(model, height_m, height_m + plain.size_m.z);
     let thing = Rig::new(&text, 0)?.object("thing")?;
     let fronts: Vec<Front> = (0..thing.links.len()).filter_map(|link| Front::of(&thing, link)).collect();
     let outer = fronts.iter().filter(|front| !fronts.iter().any(|other| other.hides(front)));
@@ -307,12 +315,15 @@ impl Front {
         if !hangs_on_base || way < if joint.is_hinge { LEAST_TURN_RAD } else { LEAST_SLIDE_M } {
             return None;
         }
-        let own: Vec<&TrueLink> =
-            (0..thing.links.len()).filter(|at| carrier(thing, *at) == index).filter_map(|at| thing.links.get(at)).collect();
+        let own: Vec<&TrueLink> = (0..thing.links.len())
+            .filter(|at| carrier(thing, *at) == index)
+            .filter_map(|at| thing.links.get(at))
+            .collect();
         let corners: Vec<(Pose, DVec3, DVec3)> =
             own.iter().flat_map(|link| link.pieces.iter().map(|piece| (link.pose, piece.low, piece.high))).collect();
         let count = corners.len().max(1) as f64;
-        let middle = corners.iter().map(|(pose, low, high)| pose.transform_point(0.5 * (*low + *high))).sum::<DVec3>() / count;
+        let middle =
+            corners.iter().map(|(pose, low, high)| pose.transform_point(0.5 * (*low + *high))).sum::<DVec3>() / count;
         let axis = sense * joint.axis;
         // Models look along +x; a door of an oven or of a chest may open to another side.
         let ahead = thing.pose.transform_vector(DVec3::X);
@@ -334,10 +345,11 @@ impl Front {
         (size.x.min(size.y) >= FRONT_M).then_some(front)
     }
 
-
     fn bounds(&self) -> Piece {
         let start = Piece { low: DVec3::MAX, high: DVec3::MIN };
-        self.pieces.iter().fold(start, |all, piece| Piece { low: all.low.min(piece.low), high: all.high.max(piece.high) })
+        self.pieces
+            .iter()
+            .fold(start, |all, piece| Piece { low: all.low.min(piece.low), high: all.high.max(piece.high) })
     }
 
     /// Whether this front stands before another part.
@@ -412,7 +424,8 @@ impl Front {
         let own = thing.links.iter().enumerate().filter(|(at, _)| carrier(thing, *at) == self.link);
         let stands_out = |(at, link): (usize, &TrueLink)| -> Vec<(usize, usize)> {
             let pieces = link.pieces.iter().enumerate();
-            let out = pieces.filter(|(_, piece)| seen(&link.pose, piece.low, piece.high, &self.axes).high.z > panel + STANDS_OUT_M);
+            let out = pieces
+                .filter(|(_, piece)| seen(&link.pose, piece.low, piece.high, &self.axes).high.z > panel + STANDS_OUT_M);
             out.map(|(index, _)| (at, index)).collect()
         };
         own.flat_map(stands_out).collect()
@@ -447,7 +460,9 @@ impl Front {
                 there.is_some_and(|there| (there - height).abs() < 0.002)
             });
             let along = [(PALM_M, self.axes.x_axis), (DVec2::new(PALM_M.y, PALM_M.x), self.axes.y_axis)];
-            let Some((_, palm)) = along.into_iter().find(|(half, _)| self.room(right, up, height, *half)) else { continue };
+            let Some((_, palm)) = along.into_iter().find(|(half, _)| self.room(right, up, height, *half)) else {
+                continue;
+            };
             // Far from the hinge, and not at an end of it.
             let aside = if self.axis.dot(self.axes.y_axis).abs() > 0.5 { up - middle.y } else { right - middle.x };
             let merit = self.merit(right, up) - if self.is_hinge { 0.5 * aside.abs() } else { 0.0 };
@@ -466,7 +481,10 @@ impl Front {
     /// Whether nothing stands out so far beside a place that the palm would meet it before the tips are there.
     fn room(&self, right: f64, up: f64, height: f64, half: DVec2) -> bool {
         let beside = |piece: &Piece| {
-            piece.low.x < right + half.x && piece.high.x > right - half.x && piece.low.y < up + half.y && piece.high.y > up - half.y
+            piece.low.x < right + half.x
+                && piece.high.x > right - half.x
+                && piece.low.y < up + half.y
+                && piece.high.y > up - half.y
         };
         !self.pieces.iter().any(|piece| beside(piece) && piece.high.z > height + FINGERS_M)
     }
@@ -524,10 +542,17 @@ fn framed(at: DVec3, y: DVec3, z: DVec3) -> Pose {
 }
 
 /// A world with one thing in it. It hangs at its height, as if in a kitchen's wall: some doors reach below their foot.
-fn world(model: &str, height_m: f64) -> String {
+fn world(model: &str, height_m: f64, top_m: f64) -> String {
     let field = if model.starts_with("data:") { "model_file" } else { "model" };
     let objects = format!("[[object]]\nname = \"thing\"\n{field} = \"{model}\"\nposition = [0, 0, {height_m}]\n");
-    rig::scenario_on("", &objects, 0.5, 0.0, DVec3::new(1.3, 0.0, 1.3), [DVec3::new(-2.5, -2.5, 0.004), DVec3::new(2.5, 2.5, 3.0)])
+    rig::scenario_on(
+        "",
+        &objects,
+        0.5,
+        0.0,
+        DVec3::new(1.3, 0.0, HOME_M.max(top_m + OVER_M)),
+        [DVec3::new(-2.5, -2.5, 0.004), DVec3::new(2.5, 2.5, 3.0)],
+    )
 }
 
 #[cfg(test)]

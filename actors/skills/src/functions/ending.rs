@@ -1,5 +1,6 @@
 //! How functions end that leave a part where it is: fingers open, back off, and nothing is felt any more.
 
+use crate::hand::{Hand, pads_in_contact};
 use crate::{
     approach::drawn_back,
     motion::{Pace, Path},
@@ -7,7 +8,6 @@ use crate::{
     run::Next,
     sequence::Moment,
 };
-use crate::hand::{Hand, pads_in_contact};
 use acm_concept::{ids::ObjectId, pose::Pose, skill::FailureCause};
 
 /// How far the fingers open beyond what they held, metres.
@@ -39,7 +39,9 @@ pub(crate) fn back_off_by(hand: &Hand, distance_m: f64) -> Next {
 pub(crate) fn felt_free(moment: &mut Moment<'_>, object: ObjectId) -> Option<Next> {
     if pads_in_contact(moment.feedback) != [false, false] {
         let gap_mm = 1e3 * moment.feedback.opening_m;
-        let reason = format!("the fingers are open and the hand has backed off, but a pad still feels something: gap {gap_mm:.1} mm");
+        let reason = format!(
+            "the fingers are open and the hand has backed off, but a pad still feels something: gap {gap_mm:.1} mm"
+        );
         return Some(Next::fail(FailureCause::Place, reason));
     }
     moment.notes.feel_empty(object);

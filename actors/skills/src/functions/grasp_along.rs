@@ -4,11 +4,7 @@
 //! along y, and `height`, of the thing over its base, metres; `sides`, how many sides look alike when it is turned about
 //! the upright axis through its base (1 if absent; 0 for round things): their approaches are tried as well.
 
-use super::{
-    PERCEPTION_ERROR_M, ROOMY_M, argument,
-    articulated::surroundings,
-    number, require_empty_hand,
-};
+use super::{PERCEPTION_ERROR_M, ROOMY_M, argument, articulated::surroundings, number, require_empty_hand};
 use crate::{
     approach::{Surroundings, choose, drawn_back, facing, tilted, turned_about, way},
     clearance::SAFETY_M,

@@ -36,9 +36,8 @@ impl CarryHeld {
     /// To where its base comes to the destination.
     pub fn to_destination(invocation: &SkillInvocation, hand: &Hand) -> Result<CarryHeld, StartError> {
         let (object, base_in_tcp) = held(invocation)?;
-        let place = invocation
-            .destination
-            .ok_or_else(|| StartError::NoDestination { kind: invocation.kind.clone() })?;
+        let place =
+            invocation.destination.ok_or_else(|| StartError::NoDestination { kind: invocation.kind.clone() })?;
         let to = place.pose * base_in_tcp.inverse();
         within_reach(&hand.robot, "the place", to.translation)?;
         Ok(CarryHeld::new(invocation, hand, object, base_in_tcp, Kind::Move, to, 0.0))

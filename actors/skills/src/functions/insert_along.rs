@@ -77,7 +77,8 @@ impl InsertAlong {
 
     fn carry(&mut self, moment: &mut Moment<'_>) -> Option<Next> {
         if !holds_something(moment.feedback) {
-            let reason = format!("the hand is empty: its gap is {:.1} mm before the carry", 1e3 * moment.feedback.opening_m);
+            let reason =
+                format!("the hand is empty: its gap is {:.1} mm before the carry", 1e3 * moment.feedback.opening_m);
             return Some(Next::Failed(Failure::empty_handed(FailureCause::Grasp, reason)));
         }
         self.gap_m = moment.feedback.opening_m;

@@ -5,11 +5,7 @@
 //! a newton is not felt to give way.
 
 use super::{
-    PERCEPTION_ERROR_M, ROOMY_M, argument,
-    articulated::surroundings,
-    ending,
-    press_down::judge,
-    require_empty_hand,
+    PERCEPTION_ERROR_M, ROOMY_M, argument, articulated::surroundings, ending, press_down::judge, require_empty_hand,
 };
 use crate::{
     approach::{Surroundings, choose, drawn_back, facing, turned_about, way},

@@ -85,7 +85,6 @@ impl PressDown {
             stage: Stage::Begin,
         })
     }
-
 }
 
 /// What a press came to: fails if the thing did not give way.

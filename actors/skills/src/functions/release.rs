@@ -2,7 +2,10 @@
 //!
 //! No arguments. What stands nowhere falls.
 
-use super::{ending, held::{held, require_held}};
+use super::{
+    ending,
+    held::{held, require_held},
+};
 use crate::{
     controller::StartError,
     run::WayOut,

@@ -86,10 +86,16 @@ pub(crate) struct FollowPlan {
 enum Phase {
     Going,
     /// At the end of the way, or at a stop, until nothing moves.
-    Ceasing { ticks: u32, still_ticks: u32, last: DVec3 },
+    Ceasing {
+        ticks: u32,
+        still_ticks: u32,
+        last: DVec3,
+    },
     LettingGo(Release),
     /// The tips back off.
-    Parting { gone_m: f64 },
+    Parting {
+        gone_m: f64,
+    },
 }
 
 /// From holding on to the part to having moved it.
@@ -197,7 +203,8 @@ impl Follow {
         self.yield_across(hand, force, heading);
         if self.yielded.length() > MOST_YIELDING_M {
             let off_mm = 1e3 * self.yielded.length();
-            return self.failed(format!("the part led the hand {off_mm:.0} mm off the way that its joint should leave it"));
+            return self
+                .failed(format!("the part led the hand {off_mm:.0} mm off the way that its joint should leave it"));
         }
         self.remember(at);
         let lead = if self.in_place { LEAD_RAD } else { LEAD_M / self.lever };
@@ -240,7 +247,9 @@ impl Follow {
         }
         if self.reached < self.plan.least {
             let (reached, wanted, most_n) = (self.words(self.reached), self.words(self.goal), self.resistance_n);
-            return Some(self.failed(format!("blocked after {reached} of {wanted}: it resisted with up to {most_n:.0} N")));
+            return Some(
+                self.failed(format!("blocked after {reached} of {wanted}: it resisted with up to {most_n:.0} N")),
+            );
         }
         self.stopped = true;
         self.phase = Phase::Ceasing { ticks: 0, still_ticks: 0, last: at };
@@ -386,7 +395,8 @@ fn limited(hand: &Hand, wanted: Pose) -> Pose {
     let from = hand.command.tcp;
     let (step_m, turn_rad) = (from.translation.distance(wanted.translation), from.angle_to(&wanted));
     let (most_m, most_rad) = (0.95 * hand.robot.max_speed_m_s, 0.95 * hand.robot.max_turn_rad_s);
-    let share = (most_m * hand.robot.tick_s / step_m.max(1e-12)).min(most_rad * hand.robot.tick_s / turn_rad.max(1e-12));
+    let share =
+        (most_m * hand.robot.tick_s / step_m.max(1e-12)).min(most_rad * hand.robot.tick_s / turn_rad.max(1e-12));
     if share >= 1.0 { wanted } else { from.interpolate(&wanted, share) }
 }
 

@@ -107,7 +107,15 @@ impl Grasp {
         let advance = Advance::new(hand, along, plan.travel_m, APPROACH_M_S, TOUCH_N);
         let limit_s = advance.duration_s() + CLOSING_LIMIT_S;
         let open_m = hand.command.opening_m;
-        Grasp { plan, start: start.translation, along, open_m, phase: Phase::Approach(advance), touched: false, limit_s }
+        Grasp {
+            plan,
+            start: start.translation,
+            along,
+            open_m,
+            phase: Phase::Approach(advance),
+            touched: false,
+            limit_s,
+        }
     }
 
     fn close(&mut self, hand: &mut Hand, feedback: &Feedback) -> Step {

@@ -99,10 +99,23 @@ enum Phase {
     /// On the way down to it.
     SetDown(Place),
     /// Lower than the rim by a little: the edge of the opening, or a dent.
-    Look { place: Place, ticks: u32 },
-    Sink { rim_m: f64, best_m: f64, stuck_ticks: u32, ground_ticks: u32 },
+    Look {
+        place: Place,
+        ticks: u32,
+    },
+    Sink {
+        rim_m: f64,
+        best_m: f64,
+        stuck_ticks: u32,
+        ground_ticks: u32,
+    },
     /// Drawn back a little, then pushed one way and the other.
-    Probe { depth_m: f64, leg: usize, gone_m: f64, most_n: f64 },
+    Probe {
+        depth_m: f64,
+        leg: usize,
+        gone_m: f64,
+        most_n: f64,
+    },
 }
 
 /// Where the search is.
@@ -167,7 +180,8 @@ impl Insert {
         let at = self.centre + aside;
         let [u, v] = self.across;
         let InsertPlan { direction, tip_m, .. } = self.plan;
-        let turn = self.start.rotation * DQuat::from_rotation_y(ROCK_RAD * self.rock.sin()) * self.start.rotation.inverse();
+        let turn =
+            self.start.rotation * DQuat::from_rotation_y(ROCK_RAD * self.rock.sin()) * self.start.rotation.inverse();
         // Rocking leaves the tip where it is.
         let tip = self.start.translation + (self.along_m + tip_m) * direction + at.x * u + at.y * v;
         hand.command.tcp = Pose::new(tip - tip_m * (turn * direction), (turn * self.start.rotation).normalize());
@@ -342,7 +356,8 @@ impl Insert {
         if *gone_m > 2.0 * reach_m {
             if *most_n < PROBE_N {
                 let (depth_mm, side_mm) = (1e3 * *depth_m, 1e3 * reach_m);
-                let reason = format!("at a depth of {depth_mm:.1} mm it moves {side_mm:.1} mm sideways: nothing encloses it");
+                let reason =
+                    format!("at a depth of {depth_mm:.1} mm it moves {side_mm:.1} mm sideways: nothing encloses it");
                 return failed(reason);
             }
             (*leg, *gone_m, *most_n) = (*leg + 1, 0.0, 0.0);

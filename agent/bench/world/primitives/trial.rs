@@ -56,13 +56,21 @@ impl Thing {
     fn of(values: &Values) -> Thing {
         let (width, round) = (values.metres("width"), values.is("round"));
         let depth = values.metres("depth");
-        Thing { width, depth: if round || depth == 0.0 { width } else { depth }, height: values.metres("height"), round }
+        Thing {
+            width,
+            depth: if round || depth == 0.0 { width } else { depth },
+            height: values.metres("height"),
+            round,
+        }
     }
     /// Its model; the closing direction, y, sees the width.
     fn model(&self, values: &Values, fixed: bool) -> String {
         let Thing { width, depth, height, round } = *self;
         let (solid, volume) = if round {
-            (format!("shape = \"cylinder\"\nradius = {}\nheight = {height}", 0.5 * width), PI * width * width * height / 4.0)
+            (
+                format!("shape = \"cylinder\"\nradius = {}\nheight = {height}", 0.5 * width),
+                PI * width * width * height / 4.0,
+            )
         } else {
             (format!("shape = \"box\"\nsize = [{depth}, {width}, {height}]"), width * depth * height)
         };
@@ -94,7 +102,8 @@ impl Thing {
     }
 }
 
-/// When the skill under test began and ended, seconds.
+/// When the primitive under test began and ended, seconds; for a grasp and a release the whole skill, since a thing may be
+/// lost on the way to them and after them.
 type Window = (f64, f64);
 
 /// Runs a cell with a seed. A slip needs to know when: the try is first run without it.
@@ -106,7 +115,7 @@ pub fn run(cell: &Cell, values: &Values, seed: u64) -> Result<Trial> {
     if cell.fault != Some(Fault::Slip) {
         return Ok(trial);
     }
-    let share = 0.35 + 0.3 * values.get("turn") / std::f64::consts::TAU;
+    let share = 0.3 + 0.3 * values.get("turn") / std::f64::consts::TAU;
     let at_s = window.0 + share * (window.1 - window.0);
     Ok(attempt(cell, values, seed, Some(at_s))?.0)
 }
@@ -144,7 +153,8 @@ impl<'a> Stage<'a> {
         let base = Pose::from_yaw(at, values.get("heading_deg").to_radians());
         let goal = goal(cell, values, &thing, base);
         let missing = cell.fault == Some(Fault::Missing) && cell.primitive != Primitive::Insert;
-        let stuck = cell.fault == Some(Fault::Block) && matches!(cell.primitive, Primitive::Grasp | Primitive::Pull | Primitive::Push);
+        let stuck = cell.fault == Some(Fault::Block)
+            && matches!(cell.primitive, Primitive::Grasp | Primitive::Pull | Primitive::Push);
         let real = if missing { DVec3::new(1.2, 1.2, TABLE_M) } else { at };
         let mut models = thing.model(values, stuck);
         let mut objects = object("thing", "thing", real, base.yaw());
@@ -156,7 +166,11 @@ impl<'a> Stage<'a> {
         if cell.fault == Some(Fault::Block) && matches!(cell.primitive, Primitive::Reach | Primitive::Move) {
             models += "[[model]]\nmodel = \"wall\"\nsummary = \"\"\nfixed = true\n[[model.solid]]\nshape = \"box\"\n\
                        size = [0.4, 0.4, 0.42]\nposition = [0, 0, 0.21]\ncolor = \"#808080\"\n";
-            let wall = if cell.primitive == Primitive::Reach { at + 0.26 * DVec3::X } else { goal.translation.with_z(TABLE_M) };
+            let wall = if cell.primitive == Primitive::Reach {
+                at + 0.26 * DVec3::X
+            } else {
+                goal.translation.with_z(TABLE_M)
+            };
             objects += &object("wall", "wall", wall, 0.0);
         }
         if let Some(at_s) = slip_s {
@@ -183,7 +197,11 @@ impl<'a> Stage<'a> {
         match self.cell.primitive {
             Primitive::Grasp => self.test(pick),
             Primitive::Reach => {
-                let frame = if side { thing.side(base) * Pose::from_translation(DVec3::Z * 0.5 * thing.depth) } else { base * Pose::from_translation(DVec3::Z * thing.height) };
+                let frame = if side {
+                    thing.side(base) * Pose::from_translation(DVec3::Z * 0.5 * thing.depth)
+                } else {
+                    base * Pose::from_translation(DVec3::Z * thing.height)
+                };
                 let mut reach = invocation("reach", THING, base, frame, &[("distance", 0.03), ("opening", 0.08)]);
                 if self.cell.fault == Some(Fault::Block) {
                     // To where the wall is.
@@ -201,12 +219,19 @@ impl<'a> Stage<'a> {
                 self.test(invocation("pull-along", THING, base, thing.deep(base), &arguments))
             }
             Primitive::Push => {
-                let side = base * Pose::new(DVec3::new(0.5 * thing.depth, 0.0, 0.5 * thing.height), DQuat::from_rotation_y(FRAC_PI_2));
+                let side = base
+                    * Pose::new(
+                        DVec3::new(0.5 * thing.depth, 0.0, 0.5 * thing.height),
+                        DQuat::from_rotation_y(FRAC_PI_2),
+                    );
                 self.test(invocation("push-along", THING, base, side, &[("travel", self.values.metres("travel"))]))
             }
             Primitive::Move | Primitive::Rotate | Primitive::Insert | Primitive::Release => {
-                let report = self.rig.done(&pick).map_err(|reason| format!("before the {}: {reason}", self.cell.primitive))?;
-                let Some((_, held)) = report.held else { return Err("the grasp did not say how the thing sits in the hand".into()) };
+                let report =
+                    self.rig.done(&pick).map_err(|reason| format!("before the {}: {reason}", self.cell.primitive))?;
+                let Some((_, held)) = report.held else {
+                    return Err("the grasp did not say how the thing sits in the hand".into());
+                };
                 let with_held = |kind: &str, arguments: &[(&str, f64)]| {
                     let mut invocation = invocation(kind, THING, base, base, arguments);
                     invocation.held = Some((THING, held, part(base)));
@@ -218,13 +243,15 @@ impl<'a> Stage<'a> {
                     Primitive::Rotate => with_held("rotate", &[("angle", self.values.get("angle_deg").to_radians())]),
                     Primitive::Insert => {
                         let off = self.values.metres("lateral") * DVec2::from_angle(self.values.get("turn"));
-                        let arguments = [("depth", self.values.metres("sink")), ("clearance", self.values.metres("clearance"))];
+                        let arguments =
+                            [("depth", self.values.metres("sink")), ("clearance", self.values.metres("clearance"))];
                         let mut insert = with_held("insert-along", &arguments);
                         insert.destination = place(Pose::new(FIXTURE + off.extend(0.0), self.goal.rotation));
                         insert
                     }
                     _ => {
-                        let mut down = with_held("place-upright", &[("grip_width", thing.width), ("height", thing.height)]);
+                        let mut down =
+                            with_held("place-upright", &[("grip_width", thing.width), ("height", thing.height)]);
                         let off = self.values.metres("believed_off") * DVec3::X;
                         down.destination = place(Pose::new(self.goal.translation + off, self.goal.rotation));
                         down
@@ -239,6 +266,12 @@ impl<'a> Stage<'a> {
         let began_s = self.rig.feedback().time.seconds();
         let report = self.rig.done(&invocation);
         self.window = (began_s, self.rig.feedback().time.seconds());
+        let whole = matches!(self.cell.primitive, Primitive::Grasp | Primitive::Release);
+        if let Ok(report) = &report
+            && let Some(own) = report.primitives.iter().rev().find(|own| own.primitive == self.cell.primitive && !whole)
+        {
+            self.window = (own.started.seconds(), own.ended.seconds());
+        }
         report
     }
 
@@ -247,7 +280,8 @@ impl<'a> Stage<'a> {
         let thing = self.rig.object("thing")?;
         let (at, start) = (thing.pose.translation, self.base.translation);
         let tilt = thing.pose.transform_vector(DVec3::Z).angle_between(DVec3::Z);
-        let far = |what: &str, off_m: f64, most_m: f64| (off_m > most_m).then(|| format!("{what} by {:.1} mm", 1e3 * off_m));
+        let far =
+            |what: &str, off_m: f64, most_m: f64| (off_m > most_m).then(|| format!("{what} by {:.1} mm", 1e3 * off_m));
         let free = (thing.held).then(|| "the hand still holds it".to_string());
         let held = (!thing.held).then(|| "the hand does not hold it".to_string());
         Ok(match self.cell.primitive {
@@ -261,7 +295,9 @@ impl<'a> Stage<'a> {
                 let off = (turned - wanted).abs().max(0.0);
                 // The grasp may have turned the hand, never the thing; the hand looks down, so it turns the other way.
                 let wrong = acm_concept::pose::wrap_angle(truly + wanted).abs().max(off);
-                held.or_else(|| (wrong > TURN_RAD).then(|| format!("the turn is off by {:.1} degrees", wrong.to_degrees())))
+                held.or_else(|| {
+                    (wrong > TURN_RAD).then(|| format!("the turn is off by {:.1} degrees", wrong.to_degrees()))
+                })
             }
             Primitive::Flip => free.or_else(|| {
                 (tilt < PI - FLIP_RAD).then(|| format!("it is tilted by {:.0} degrees", tilt.to_degrees()))
@@ -314,16 +350,15 @@ fn object(name: &str, model: &str, at: DVec3, yaw: f64) -> String {
 fn fixture(values: &Values, thing: &Thing, closed: bool) -> String {
     let (hole, sink) = (thing.width + values.metres("clearance"), values.metres("sink"));
     let (off, long) = (0.5 * (hole + WALL_M), hole + 2.0 * WALL_M);
-    let mut walls = vec![
-        (off, 0.0, WALL_M, long),
-        (-off, 0.0, WALL_M, long),
-        (0.0, off, hole, WALL_M),
-        (0.0, -off, hole, WALL_M),
-    ];
+    let mut walls =
+        vec![(off, 0.0, WALL_M, long), (-off, 0.0, WALL_M, long), (0.0, off, hole, WALL_M), (0.0, -off, hole, WALL_M)];
     if closed {
         walls.push((0.0, 0.0, hole, hole));
     }
-    let mut text = format!("[[model]]\nmodel = \"fixture\"\nsummary = \"\"\nfixed = true\nfriction = {}\n", values.get("friction"));
+    let mut text = format!(
+        "[[model]]\nmodel = \"fixture\"\nsummary = \"\"\nfixed = true\nfriction = {}\n",
+        values.get("friction")
+    );
     for (x, y, along, across) in walls {
         text += &format!(
             "[[model.solid]]\nshape = \"box\"\nsize = [{along}, {across}, {sink}]\nposition = [{x}, {y}, {}]\ncolor = \"#808080\"\n",

@@ -59,7 +59,8 @@ fn a_template_is_read_and_evaluated() {
 
 #[test]
 fn a_frame_may_look_out_of_any_side() {
-    let axes = [("x", DVec3::X), ("-x", -DVec3::X), ("y", DVec3::Y), ("-y", -DVec3::Y), ("z", DVec3::Z), ("-z", -DVec3::Z)];
+    let axes =
+        [("x", DVec3::X), ("-x", -DVec3::X), ("y", DVec3::Y), ("-y", -DVec3::Y), ("z", DVec3::Z), ("-z", -DVec3::Z)];
     for (name, out) in axes {
         let text = PUCK.replace("name = \"top\"", &format!("name = \"top\"\nout = \"{name}\""));
         let puck = Template::parse("puck.toml", &text).unwrap();
