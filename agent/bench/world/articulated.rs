@@ -45,6 +45,9 @@ const PALM_M: DVec2 = DVec2::new(0.108, 0.038);
 const FINGERS_M: f64 = 0.04;
 /// The height of things that are not tall, metres: the hand must get under their handles.
 const RAISED_M: f64 = 0.7;
+/// The hand waits at this height, or so much over the thing: it goes home over doors that stand open; metres.
+const HOME_M: f64 = 1.3;
+const OVER_M: f64 = 0.4;
 /// What is higher than this stands near the ground, metres: some doors reach below their foot.
 const TALL_M: f64 = 0.75;
 const GROUND_M: f64 = 0.05;
@@ -109,8 +112,9 @@ pub struct Swing {
     pub is_hinge: bool,
     /// How far it can go, radians or metres.
     pub way: f64,
-    /// The share of it that it stood open, and that it was left open in the end.
+    /// The share of it that it stood open.
     pub opened: f64,
+    /// The share of it that it was left open in the end.
     pub left: f64,
     /// Greatest force at the wrist, newtons.
     pub most_n: f64,
@@ -158,9 +162,9 @@ pub fn models(data: Option<&Path>) -> Vec<String> {
 /// # Errors
 /// The world cannot be built.
 pub fn run_model(model: &str) -> Result<Vec<Swing>> {
-    let plain = Rig::new(&world(model, 0.0), 0)?.object("thing")?;
+    let plain = Rig::new(&world(model, 0.0, 0.0), 0)?.object("thing")?;
     let height_m = if plain.size_m.z > TALL_M { GROUND_M } else { RAISED_M };
-    let text = world(model, height_m);
+    let text = world(model, height_m, height_m + plain.size_m.z);
     let thing = Rig::new(&text, 0)?.object("thing")?;
     let fronts: Vec<Front> = (0..thing.links.len()).filter_map(|link| Front::of(&thing, link)).collect();
     let outer = fronts.iter().filter(|front| !fronts.iter().any(|other| other.hides(front)));
@@ -538,7 +542,7 @@ fn framed(at: DVec3, y: DVec3, z: DVec3) -> Pose {
 }
 
 /// A world with one thing in it. It hangs at its height, as if in a kitchen's wall: some doors reach below their foot.
-fn world(model: &str, height_m: f64) -> String {
+fn world(model: &str, height_m: f64, top_m: f64) -> String {
     let field = if model.starts_with("data:") { "model_file" } else { "model" };
     let objects = format!("[[object]]\nname = \"thing\"\n{field} = \"{model}\"\nposition = [0, 0, {height_m}]\n");
     rig::scenario_on(
@@ -546,7 +550,7 @@ fn world(model: &str, height_m: f64) -> String {
         &objects,
         0.5,
         0.0,
-        DVec3::new(1.3, 0.0, 1.3),
+        DVec3::new(1.3, 0.0, HOME_M.max(top_m + OVER_M)),
         [DVec3::new(-2.5, -2.5, 0.004), DVec3::new(2.5, 2.5, 3.0)],
     )
 }

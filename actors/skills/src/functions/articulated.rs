@@ -4,10 +4,9 @@ use super::{PERCEPTION_ERROR_M, ROOMY_M, argument, ending, number};
 use crate::{
     approach::{Surroundings, choose, drawn_back, facing, tilted, turned_about, way},
     articulation::Articulation,
-    clearance::GUARD_M,
     controller::StartError,
     hand::Hand,
-    motion::Pace,
+    motion::{Pace, Path},
     primitives::{Follow, FollowPlan, Grasp, GraspPlan, GripWatch, Hold, Outcome, Reach},
     run::{Next, Notes, WayOut},
     sequence::{Moment, Step, Steps},
@@ -29,6 +28,8 @@ const LEAST_SPREAD_M: f64 = 0.008;
 const TILTS: [f64; 5] = [0.0, 0.35, -0.35, 0.7, -0.7];
 /// Distance from the part at which the hand comes to rest before it goes to it, metres.
 const STANDOFF_M: f64 = 0.06;
+/// The last stretch before that, which goes straight on, metres.
+const STRAIGHT_M: f64 = 0.1;
 /// How far the hand backs off in the end, metres.
 const LEAVE_M: f64 = 0.1;
 /// Speed along the way, m/s: with a part in the hand, and pressing against it.
@@ -188,8 +189,15 @@ impl Draw {
     }
 
     fn reach(&mut self, moment: &mut Moment<'_>) -> Option<Next> {
-        let before = drawn_back(&self.grasp_at, STANDOFF_M);
+        let before = drawn_back(&self.grasp_at, STANDOFF_M + STRAIGHT_M);
         let path = way(moment.hand, before, &self.around, Pace::free(&moment.hand.robot));
+        Some(Next::begin(Reach::passing(path, self.opening_m)))
+    }
+
+    /// Straight on towards the part: what stands out from it may not be passed sideways.
+    fn close_in(&mut self, moment: &mut Moment<'_>) -> Option<Next> {
+        let (hand, before) = (moment.hand, drawn_back(&self.grasp_at, STANDOFF_M));
+        let path = Path::through(hand.command.tcp, &[before], Pace::free(&hand.robot), hand.robot.tick_s);
         Some(Next::begin(Reach::new(path, self.opening_m)))
     }
 
@@ -210,6 +218,7 @@ impl Draw {
 impl Steps for Draw {
     const STEPS: &'static [Step<Draw>] = &[
         Draw::reach,
+        Draw::close_in,
         Draw::grasp,
         Draw::follow,
         |draw, moment| judge_stop(moment, draw.must_stop),
@@ -308,13 +317,13 @@ impl Drive {
     }
 
     fn reach(&mut self, moment: &mut Moment<'_>) -> Option<Next> {
-        let before = Pose::new(self.start().translation + GUARD_M * self.back, self.start().rotation);
+        let before = Pose::new(self.start().translation + STRAIGHT_M * self.back, self.start().rotation);
         let path = way(moment.hand, before, &self.around, Pace::free(&moment.hand.robot));
         Some(Next::begin(Reach::new(path, 0.0)))
     }
 
     fn close_in(&mut self, moment: &mut Moment<'_>) -> Option<Next> {
-        let path = crate::motion::Path::through(
+        let path = Path::through(
             moment.hand.command.tcp,
             &[self.start()],
             Pace::gentle(&moment.hand.robot),

@@ -23,6 +23,7 @@ const MAX_TICKS: usize = 6000;
 
 /// A world with a robot in it.
 pub struct Rig {
+    /// The simulation.
     pub simulation: Simulation,
     robot: Box<dyn Embodiment>,
     /// Greatest force at the wrist so far, newtons.

@@ -102,7 +102,8 @@ impl Thing {
     }
 }
 
-/// When the skill under test began and ended, seconds.
+/// When the primitive under test began and ended, seconds; for a grasp and a release the whole skill, since a thing may be
+/// lost on the way to them and after them.
 type Window = (f64, f64);
 
 /// Runs a cell with a seed. A slip needs to know when: the try is first run without it.
@@ -114,7 +115,7 @@ pub fn run(cell: &Cell, values: &Values, seed: u64) -> Result<Trial> {
     if cell.fault != Some(Fault::Slip) {
         return Ok(trial);
     }
-    let share = 0.35 + 0.3 * values.get("turn") / std::f64::consts::TAU;
+    let share = 0.3 + 0.3 * values.get("turn") / std::f64::consts::TAU;
     let at_s = window.0 + share * (window.1 - window.0);
     Ok(attempt(cell, values, seed, Some(at_s))?.0)
 }
@@ -265,6 +266,12 @@ impl<'a> Stage<'a> {
         let began_s = self.rig.feedback().time.seconds();
         let report = self.rig.done(&invocation);
         self.window = (began_s, self.rig.feedback().time.seconds());
+        let whole = matches!(self.cell.primitive, Primitive::Grasp | Primitive::Release);
+        if let Ok(report) = &report
+            && let Some(own) = report.primitives.iter().rev().find(|own| own.primitive == self.cell.primitive && !whole)
+        {
+            self.window = (own.started.seconds(), own.ended.seconds());
+        }
         report
     }
 
