@@ -209,10 +209,7 @@ fn now(rig: &Rig, front: &Front) -> Result<TrueJoint> {
 fn open(rig: &mut Rig, thing: &TrueObject, front: &Front) -> Result<(), String> {
     let (frame, width_m) = front.handle().ok_or("it has no handle that the hand can take")?;
     let handles = front.handles(thing);
-    // What falls open by its weight is led to its end: let go half way, it would fall on the hand.
-    let falls = front.is_hinge && front.axis.z.abs() < 0.5;
-    let share = if falls { 1.0 } else { OPEN_SHARE + FARTHER_SHARE };
-    let travel = share * front.way;
+    let travel = (OPEN_SHARE + FARTHER_SHARE) * front.way;
     let mut arguments = front.joint_in(&frame);
     arguments.push(("grip_width", width_m));
     arguments.push((if front.is_hinge { "angle" } else { "travel" }, travel));

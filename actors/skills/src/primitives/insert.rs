@@ -305,7 +305,9 @@ impl Insert {
         if depth_m > self.plan.depth_m + BEYOND_M {
             return failed(format!("{:.1} mm beyond the expected depth there is no ground", 1e3 * BEYOND_M));
         }
-        if *ground_ticks > hand.ticks(ground_s) || whole {
+        // What no rocking brings deeper is in, if it is deep enough.
+        let settled = deep && *stuck_ticks > hand.ticks(JAM_S);
+        if *ground_ticks > hand.ticks(ground_s) || whole || settled {
             self.along_m = at_m - LIFT_M;
             self.phase = Phase::Probe { depth_m, leg: 0, gone_m: 0.0, most_n: 0.0 };
             self.command(hand, DVec2::ZERO);
