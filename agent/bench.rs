@@ -5,10 +5,12 @@
 //! | [`targets`] | floors and goals, and the comparison with them |
 //! | [`perception`] | segmentation of real frames and the time a frame takes |
 //! | [`runtime`] | frames and messages from one to the other, the trace, restarts |
+//! | [`world`] | physics and pictures beside MuJoCo, grasps and primitives, pace, audit, snapshots |
 
 pub mod perception;
 pub mod runtime;
 pub mod targets;
+pub mod world;
 
 use crate::cli::{BenchArgs, BenchCommand, Exit};
 use anyhow::Context;
@@ -134,6 +136,7 @@ pub fn run(command: &BenchCommand) -> anyhow::Result<Exit> {
     let (args, measure): (&BenchArgs, fn(&BenchArgs) -> anyhow::Result<BenchResult>) = match command {
         BenchCommand::Perception(args) => (args, perception::measure),
         BenchCommand::Runtime(args) => (args, runtime::measure),
+        BenchCommand::World(args) => (args, world::measure),
     };
     // First, so that a mistake in the file does not cost the measurement.
     let targets = match &args.against {

@@ -365,6 +365,8 @@ pub enum BenchCommand {
     Perception(BenchArgs),
     /// Frames between processes, messages between actors, what a trace costs, how fast an actor is replaced.
     Runtime(BenchArgs),
+    /// Physics beside MuJoCo, grasps, primitives, rendering, pace, physics audit, snapshots.
+    World(BenchArgs),
 }
 
 /// Arguments of every bench.

@@ -30,13 +30,14 @@ const FINGER_M: DVec3 = DVec3::new(0.022, 0.012, 0.048);
 const HAND_M: DVec3 = DVec3::new(0.06, 0.2, 0.066);
 
 const HAND_KG: f32 = 0.7;
-/// A finger and its share of the drive's inertia. Light fingers between stiff contacts let what they hold creep.
-const FINGER_KG: f32 = 0.2;
+/// A finger and its share of the drive's inertia. Light fingers between stiff contacts let what they hold creep: with half
+/// of this it creeps twice as far.
+const FINGER_KG: f32 = 0.4;
 /// Stiffness and damping of the wrist for shifts, N/m and N s/m, and the force it can bear, N.
 const WRIST_SHIFT: [f32; 3] = [8000.0, 300.0, 60.0];
 /// The same for turns, N m/rad, N m s/rad, N m.
 const WRIST_TURN: [f32; 3] = [200.0, 8.0, 10.0];
-const FINGER_STIFFNESS: f32 = 20_000.0;
+const FINGER_STIFFNESS: f32 = 8_000.0;
 const FINGER_DAMPING: f32 = 40.0;
 /// Speed of each finger, metres per second.
 const FINGER_SPEED: f64 = 0.1;

@@ -238,8 +238,8 @@ impl Placed {
             spec: index,
             model: model.clone(),
             fixed: *fixed,
-            density: *density_kg_m3,
-            friction: *friction,
+            density: make.density_kg_m3.unwrap_or(*density_kg_m3),
+            friction: make.friction.unwrap_or(*friction),
             solids: solid.iter().map(|solid| make.apply(built(solid, grow, bevel))).collect(),
             cap: button.iter().flat_map(|button| &button.solid).map(|solid| built(solid, DVec3::ZERO, 0.0)).collect(),
             button: button.clone(),
@@ -279,10 +279,15 @@ impl Placed {
 struct Make {
     scale: DVec3,
     hue_deg: Option<f64>,
+    density_kg_m3: Option<f64>,
+    friction: Option<f64>,
 }
 
 /// Factors beyond these make no sense.
 const SCALES: std::ops::RangeInclusive<f64> = 0.1..=10.0;
+/// From a foam to the heaviest metals, kg/m3.
+const DENSITIES: std::ops::RangeInclusive<f64> = 1.0..=25_000.0;
+const FRICTIONS: std::ops::RangeInclusive<f64> = 0.0..=2.0;
 
 impl Make {
     fn of(spec: &ObjectSpec, scope: &Scope) -> Result<Make, LayoutError> {
@@ -295,7 +300,9 @@ impl Make {
             return Err(LayoutError::Value { name: spec.name.clone(), reason });
         }
         let hue_deg = spec.hue_deg.as_ref().map(|hue| evaluate(&spec.name, hue, scope)).transpose()?;
-        Ok(Make { scale, hue_deg })
+        let density_kg_m3 = within(&spec.name, "density_kg_m3", spec.density_kg_m3.as_ref(), DENSITIES, scope)?;
+        let friction = within(&spec.name, "friction", spec.friction.as_ref(), FRICTIONS, scope)?;
+        Ok(Make { scale, hue_deg, density_kg_m3, friction })
     }
 
     /// Stretches sizes and places along the object's axes, angles kept, and turns the hue.
@@ -396,6 +403,23 @@ fn evaluate(name: &str, expression: &Expression, scope: &Scope) -> Result<f64, L
         return Ok(value);
     }
     let reason = format!("the expression `{}` gives {value}", expression.text());
+    Err(LayoutError::Value { name: name.into(), reason })
+}
+
+/// An optional expression whose value must lie in a range.
+fn within(
+    name: &str,
+    field: &str,
+    expression: Option<&Expression>,
+    range: std::ops::RangeInclusive<f64>,
+    scope: &Scope,
+) -> Result<Option<f64>, LayoutError> {
+    let Some(expression) = expression else { return Ok(None) };
+    let value = evaluate(name, expression, scope)?;
+    if range.contains(&value) {
+        return Ok(Some(value));
+    }
+    let reason = format!("{field} {value} must lie in {} to {}", range.start(), range.end());
     Err(LayoutError::Value { name: name.into(), reason })
 }
 
