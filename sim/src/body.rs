@@ -10,6 +10,7 @@ use crate::{
 use acm_concept::pose::Pose;
 use glam::DVec3;
 use rapier3d::prelude::*;
+use serde::{Deserialize, Serialize};
 
 /// An object in the engine. The body's frame is the object's base frame.
 #[derive(Debug, Clone)]
@@ -80,6 +81,27 @@ impl Body {
         } else if depth < button.model.rearmed_m {
             button.armed = true;
             button.pressed = false;
+        }
+    }
+}
+
+/// What an object changes while the world runs, apart from its body.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(crate) struct BodyState {
+    start: Pose,
+    /// Pressed, presses, armed.
+    button: Option<(bool, u32, bool)>,
+}
+
+impl Body {
+    pub(crate) fn state(&self) -> BodyState {
+        let button = self.button.as_ref().map(|button| (button.pressed, button.presses, button.armed));
+        BodyState { start: self.start, button }
+    }
+    pub(crate) fn set_state(&mut self, state: BodyState) {
+        self.start = state.start;
+        if let (Some(button), Some(saved)) = (&mut self.button, state.button) {
+            (button.pressed, button.presses, button.armed) = saved;
         }
     }
 }

@@ -3,14 +3,15 @@
 use crate::{gripper::Gripper, profile::SUBSTEPS};
 use glam::DVec3;
 use rapier3d::prelude::{ColliderHandle, ContactPair, PhysicsWorld};
+use serde::{Deserialize, Serialize};
 
 /// Contacts of the two pads after one physics step.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(crate) struct Contacts {
     pads: [PadContacts; 2],
 }
 
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 struct PadContacts {
     partners: Vec<ColliderHandle>,
     /// Force on the pad, world frame, newtons.
@@ -58,7 +59,7 @@ fn impulse_on(pair: &ContactPair, collider: ColliderHandle) -> DVec3 {
 }
 
 /// Forces summed over the steps of a control tick.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(crate) struct TickForces {
     pads: [DVec3; 2],
     wrist: DVec3,

@@ -1,11 +1,13 @@
 //! One episode of a scenario, and the handles through which an agent lives in it.
 
 use crate::{
+    audit::AuditReport,
     body::Body,
     oracle::OracleVerdict,
     report::{Preview, SimError, SimOptions, SimTimings, TrueObject},
     scenario::{Scenario, TaskTemplate},
     scene::{Ids, Stage, fnv, state_hash},
+    snapshot::{self, SavedRng, Snapshot, SnapshotError, Whole, WorldState},
     world::{World, cpu_s},
 };
 use acm_concept::{
@@ -46,6 +48,8 @@ pub struct Simulation {
     cameras: Vec<Camera>,
     stage: Arc<Stage>,
     renderer: Option<SharedRenderer>,
+    /// Of the camera source that was handed out last.
+    eyes: Mutex<Arc<Mutex<Eyes>>>,
     seed: u64,
 }
 
@@ -80,6 +84,7 @@ impl Simulation {
             cameras,
             stage: Arc::new(stage),
             renderer: None,
+            eyes: Mutex::new(Arc::new(Mutex::new(Eyes::new(options.seed)))),
             seed: options.seed,
         })
     }
@@ -102,16 +107,15 @@ impl Simulation {
 
     /// The cameras. Frames are numbered from 0 by each source.
     pub fn camera(&self) -> Box<dyn CameraSource> {
-        let mut noise = ChaCha8Rng::seed_from_u64(self.seed);
-        noise.set_stream(STREAM_NOISE);
+        let eyes = Arc::new(Mutex::new(Eyes::new(self.seed)));
+        *lock(&self.eyes) = eyes.clone();
         Box::new(Cameras {
             shared: self.shared.clone(),
             models: self.cameras.iter().map(|camera| camera.nominal.clone()).collect(),
             cameras: self.cameras.clone(),
             stage: self.stage.clone(),
             renderer: self.renderer.clone(),
-            noise,
-            next: 0,
+            eyes,
         })
     }
 
@@ -153,6 +157,40 @@ impl Simulation {
     /// Processor time taken so far.
     pub fn timings(&self) -> SimTimings {
         self.world().timings
+    }
+
+    /// What happened without a cause so far; see [`AuditReport`].
+    pub fn audit(&self) -> AuditReport {
+        self.world().audit().clone()
+    }
+
+    /// The whole simulation at this moment, the camera source that was handed out last included.
+    ///
+    /// # Errors
+    /// The engine's state cannot be written down.
+    pub fn snapshot(&self) -> Result<Snapshot, SnapshotError> {
+        let world_digest = self.world_digest();
+        let world = WorldState::of(&self.world())?;
+        let eyes = lock(&self.eyes).clone();
+        let eyes = lock(&eyes);
+        let eyes = snapshot::Eyes { noise: SavedRng::of(&eyes.noise), next: eyes.next };
+        Snapshot::pack(&Whole { world_digest, world, eyes })
+    }
+
+    /// Puts the simulation where one of the same scenario, seed and options was when the snapshot was made. The handles
+    /// that were given out stay good. On an error nothing has changed.
+    ///
+    /// # Errors
+    /// The snapshot is damaged, or of another world.
+    pub fn restore(&self, snapshot: &Snapshot) -> Result<(), SnapshotError> {
+        let whole = snapshot.unpack()?;
+        if whole.world_digest != self.world_digest() || !whole.world.fits(&self.world()) {
+            return Err(SnapshotError::OtherWorld);
+        }
+        whole.world.put_into(&mut self.world());
+        let eyes = lock(&self.eyes).clone();
+        *lock(&eyes) = Eyes { noise: whole.eyes.noise.rng(), next: whole.eyes.next };
+        Ok(())
     }
 
     /// Equal for worlds whose bodies have bit-identical poses.
@@ -249,8 +287,22 @@ struct Cameras {
     cameras: Vec<Camera>,
     stage: Arc<Stage>,
     renderer: Option<SharedRenderer>,
+    eyes: Arc<Mutex<Eyes>>,
+}
+
+/// What a camera source changes from frame to frame.
+struct Eyes {
     noise: ChaCha8Rng,
+    /// Number of the next frame.
     next: u64,
+}
+
+impl Eyes {
+    fn new(seed: u64) -> Eyes {
+        let mut noise = ChaCha8Rng::seed_from_u64(seed);
+        noise.set_stream(STREAM_NOISE);
+        Eyes { noise, next: 0 }
+    }
 }
 
 impl CameraSource for Cameras {
@@ -265,7 +317,7 @@ impl CameraSource for Cameras {
         };
         let found = &self.cameras[at];
         let renderer = self.renderer.as_ref().ok_or_else(|| failed("the simulation has no renderer".into()))?;
-        let mut world = lock(&self.shared);
+        let (mut world, mut eyes) = (lock(&self.shared), lock(&self.eyes));
         let pixels = found.nominal.intrinsics.pixels();
         let (color, depth) = if world.is_covered(at) {
             (vec![0; 3 * pixels], vec![0.0; pixels])
@@ -276,18 +328,18 @@ impl CameraSource for Cameras {
             let rendered = lock(renderer).render(&scene, &truth).map_err(|e| failed(e.to_string()))?;
             world.timings.render_s += cpu_s(ClockId::ProcessCPUTime) - started;
             let started = cpu_s(ClockId::ThreadCPUTime);
-            let measured = found.sensor.measure(&rendered, &truth, &mut self.noise);
+            let measured = found.sensor.measure(&rendered, &truth, &mut eyes.noise);
             world.timings.noise_s += cpu_s(ClockId::ThreadCPUTime) - started;
             (measured.color, measured.depth)
         };
         let header = FrameHeader {
-            id: FrameId(self.next),
+            id: FrameId(eyes.next),
             camera: camera.into(),
             time: world.now(),
             intrinsics: found.nominal.intrinsics,
             camera_pose: found.nominal.pose,
         };
-        self.next += 1;
+        eyes.next += 1;
         RgbdFrame::new(header, color.into(), depth.into()).map_err(|e| failed(e.to_string()))
     }
 }

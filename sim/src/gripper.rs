@@ -14,6 +14,7 @@ use acm_concept::{
 };
 use glam::{DQuat, DVec3};
 use rapier3d::prelude::*;
+use serde::{Deserialize, Serialize};
 
 /// Where the tool centre point waits if the scenario does not say otherwise: behind and above the table, outside of
 /// the opening angle of a camera that looks down at the table from the front.
@@ -66,7 +67,7 @@ pub(crate) fn description(home: DVec3, workspace: [DVec3; 2]) -> RobotDescriptio
 }
 
 /// What the fingers are to do.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub(crate) struct Grip {
     pub(crate) opening_m: f64,
     pub(crate) force_n: f64,
@@ -82,7 +83,7 @@ pub(crate) struct Gripper {
     pub(crate) pads: [ColliderHandle; 2],
     joints: [ImpulseJointHandle; 2],
     /// Where the fingers' controller is on its way to the commanded opening, metres each finger has closed.
-    setpoint: f64,
+    pub(crate) setpoint: f64,
 }
 
 impl Gripper {
@@ -131,6 +132,11 @@ impl Gripper {
                 joint.data.set_motor_position(JointAxis::LinX, target as f32, FINGER_STIFFNESS, FINGER_DAMPING);
             }
         }
+    }
+
+    /// All its bodies.
+    pub(crate) fn bodies(&self) -> [RigidBodyHandle; 4] {
+        [self.follow, self.hand, self.fingers[0], self.fingers[1]]
     }
 
     /// Measured pose of the tool centre point.

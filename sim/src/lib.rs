@@ -10,11 +10,14 @@
 //! | `world`, `body`, `gripper`, `contact` | the running physics: objects, mechanisms, the hand, what it feels |
 //! | `event`, `slip` | what third parties do, and an injected mishap |
 //! | `oracle`, `state` | the judge and its variables |
+//! | `audit` | whether whatever happened had a cause |
+//! | `snapshot` | all of it as bytes, and back |
 //! | `episode`, `scene`, `report` | the handles, the picture, what is reported |
 //!
 //! Conventions: metres, seconds, newtons; world frame with z up; an object's base frame is the middle of its bottom.
 //! The world advances only when the robot is commanded or the clock waits.
 
+mod audit;
 mod body;
 mod contact;
 mod convert;
@@ -32,9 +35,11 @@ mod report;
 mod scenario;
 mod scene;
 mod slip;
+mod snapshot;
 mod state;
 mod world;
 
+pub use audit::AuditReport;
 pub use episode::{SharedRenderer, Simulation};
 pub use layout::LayoutError;
 pub use oracle::OracleVerdict;
@@ -42,3 +47,4 @@ pub use profile::PhysicsProfile;
 pub use random::DrawError;
 pub use report::{Preview, SimError, SimOptions, SimTimings, TrueObject};
 pub use scenario::{MAX_SCENARIO_BYTES, Scenario, ScenarioError};
+pub use snapshot::{Snapshot, SnapshotError};

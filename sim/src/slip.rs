@@ -4,12 +4,14 @@ use crate::{
     body::Body,
     event::put,
     layout::{gap, solids_at},
+    snapshot::SavedRng,
     world::World,
 };
 use acm_concept::{camera::CameraModel, pose::Pose};
 use glam::{DVec2, DVec3};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
 /// An object that is this much higher than where the pads took it is carried, metres.
@@ -39,15 +41,32 @@ pub(crate) struct Slip {
     done: bool,
 }
 
-#[derive(Debug, Clone, Copy)]
-struct Gripped {
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+pub(crate) struct Gripped {
     body: usize,
     height_m: f64,
     last_touched_s: f64,
     counted: bool,
 }
 
+/// All that the mishap changes while the world runs.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(crate) struct SlipState {
+    rng: SavedRng,
+    carries: u32,
+    gripped: Option<Gripped>,
+    done: bool,
+}
+
 impl Slip {
+    pub(crate) fn state(&self) -> SlipState {
+        SlipState { rng: SavedRng::of(&self.rng), carries: self.carries, gripped: self.gripped, done: self.done }
+    }
+    pub(crate) fn set_state(&mut self, state: SlipState) {
+        self.rng = state.rng.rng();
+        (self.carries, self.gripped, self.done) = (state.carries, state.gripped, state.done);
+    }
+
     pub(crate) fn new(at_carry: u32, seed: u64, camera: Option<CameraModel>) -> Slip {
         // A stream of its own: the mishap changes nothing else.
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -87,6 +106,7 @@ impl Slip {
             let pose = self.candidate(world, &world.bodies[gripped.body]);
             if let Some(pose) = pose.filter(|pose| self.is_free(world, gripped.body, pose)) {
                 put(&mut world.physics, &world.bodies[gripped.body], &pose);
+                world.excuse(gripped.body);
                 self.done = true;
                 return;
             }

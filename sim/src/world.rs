@@ -1,6 +1,7 @@
 //! The running world: physics, hand, mechanisms, what third parties do, and the judge who watches.
 
 use crate::{
+    audit::{self, Audit, AuditReport},
     body::{Body, true_objects},
     contact::{Contacts, TickForces},
     event::{self, Event},
@@ -11,6 +12,7 @@ use crate::{
     report::{SimError, SimOptions, SimTimings, TrueObject},
     scenario::{JudgeSpec, Scenario, SurfaceSpec, WorldSpec},
     slip::Slip,
+    snapshot::WorldState,
     state,
 };
 use acm_concept::{
@@ -39,18 +41,19 @@ pub(crate) struct World {
     pub(crate) contacts: Contacts,
     pub(crate) timings: SimTimings,
     /// The hand's commanded pose at the end of the last tick.
-    target: Pose,
+    pub(crate) target: Pose,
     pub(crate) grip: Grip,
-    events: Vec<Event>,
-    slip: Option<Slip>,
-    judge: Judge,
+    pub(crate) events: Vec<Event>,
+    pub(crate) slip: Option<Slip>,
+    pub(crate) judge: Judge,
+    pub(crate) audit: Audit,
     pub(crate) state: Vec<f64>,
     pub(crate) constants: Vec<f64>,
     pub(crate) bystanders: Vec<usize>,
-    steps: u64,
-    forces: TickForces,
+    pub(crate) steps: u64,
+    pub(crate) forces: TickForces,
     motion: bool,
-    stopped: bool,
+    pub(crate) stopped: bool,
 }
 
 impl World {
@@ -90,6 +93,7 @@ impl World {
         Ok(World {
             bystanders: bystanders(spec, &scenario.judge, &bodies),
             judge: Judge::new(&scenario.judge, &variables),
+            audit: Audit::default(),
             constants: state::constants(spec, layout),
             state: vec![0.0; variables.len()],
             target: robot.home,
@@ -129,6 +133,7 @@ impl World {
         }
         self.contacts.read(&self.physics, &self.gripper);
         self.refresh_state();
+        self.look_for_causes();
         Ok(())
     }
 
@@ -193,6 +198,9 @@ impl World {
             self.step(&from.interpolate(&target, f64::from(step) / f64::from(steps)));
         }
         self.target = target;
+        let (tcp, now_s) = (self.gripper.tcp(&self.physics), self.seconds());
+        let pads = self.forces.mean().0.map(|force| tcp.inverse().transform_vector(force));
+        self.audit.grip(pads, self.robot.max_grip_force_n, now_s);
         self.timings.physics_s += cpu_s(ClockId::ThreadCPUTime) - started;
     }
 
@@ -214,8 +222,29 @@ impl World {
             slip.step(self);
             self.slip = Some(slip);
         }
+        self.look_for_causes();
         self.refresh_state();
         self.judge.step(&self.state, self.seconds(), self.profile.step_s());
+    }
+
+    fn look_for_causes(&mut self) {
+        let robot = audit::Robot {
+            bodies: &self.gripper.bodies(),
+            tcp: self.gripper.tcp(&self.physics),
+            max_speed_m_s: self.robot.max_speed_m_s,
+        };
+        self.audit.step(&self.physics, &robot, self.seconds());
+    }
+
+    /// What happened without a cause so far.
+    pub(crate) fn audit(&self) -> &AuditReport {
+        self.audit.report()
+    }
+    /// Something outside of the world moves a body on purpose.
+    pub(crate) fn excuse(&mut self, body: usize) {
+        if let Some(body) = self.bodies.get(body) {
+            self.audit.excuse(body.handle);
+        }
     }
 
     fn refresh_state(&mut self) {
@@ -270,14 +299,13 @@ impl World {
     /// How the episode stands. The judge looks a little further than the present, so that a stage that has to hold
     /// for a while is not missed by an agent that stops at once; the world itself does not advance.
     pub(crate) fn verdict(&mut self) -> OracleVerdict {
-        let Ok(ahead) = copy(&self.physics) else { return self.judge.verdict(&self.state) };
-        let saved = Saved::take(self, ahead);
+        let Ok(now) = WorldState::of(self) else { return self.judge.verdict(&self.state) };
         let until = self.seconds() + self.judge.settle_s();
         while self.seconds() < until {
             self.step(&self.target.clone());
         }
         let verdict = self.judge.verdict(&self.state);
-        saved.restore(self);
+        now.put_into(self);
         verdict
     }
 
@@ -288,55 +316,6 @@ impl World {
 
 /// Longest single wait, seconds.
 const MAX_WAIT_S: f64 = 3600.0;
-
-/// What a look ahead changes.
-struct Saved {
-    physics: PhysicsWorld,
-    bodies: Vec<Body>,
-    gripper: Gripper,
-    contacts: Contacts,
-    judge: Judge,
-    events: Vec<Event>,
-    slip: Option<Slip>,
-    state: Vec<f64>,
-    steps: u64,
-    forces: TickForces,
-}
-
-impl Saved {
-    /// Puts the present aside; the world goes on with a copy of its physics.
-    fn take(world: &mut World, ahead: PhysicsWorld) -> Saved {
-        Saved {
-            physics: std::mem::replace(&mut world.physics, ahead),
-            bodies: world.bodies.clone(),
-            gripper: world.gripper.clone(),
-            contacts: world.contacts.clone(),
-            judge: world.judge.clone(),
-            events: world.events.clone(),
-            slip: world.slip.clone(),
-            state: world.state.clone(),
-            steps: world.steps,
-            forces: world.forces.clone(),
-        }
-    }
-    fn restore(self, world: &mut World) {
-        world.physics = self.physics;
-        world.bodies = self.bodies;
-        world.gripper = self.gripper;
-        world.contacts = self.contacts;
-        world.judge = self.judge;
-        world.events = self.events;
-        world.slip = self.slip;
-        world.state = self.state;
-        world.steps = self.steps;
-        world.forces = self.forces;
-    }
-}
-
-/// A copy that goes on exactly as the original would. The engine's state has no other way of being copied.
-fn copy(physics: &PhysicsWorld) -> Result<PhysicsWorld, bincode::Error> {
-    bincode::deserialize(&bincode::serialize(physics)?)
-}
 
 fn insert_surface(physics: &mut PhysicsWorld, surface: &SurfaceSpec) -> ColliderHandle {
     let half = (surface.size * 0.5).as_vec3();
