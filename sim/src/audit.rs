@@ -8,6 +8,7 @@
 //! Kinematic bodies are third parties or the robot, and a body that changes its kind has just been taken or put down by
 //! one. An injected mishap is excused by whoever injects it.
 
+use crate::oracle::OracleVerdict;
 use acm_concept::pose::Pose;
 use glam::{DQuat, DVec3};
 use rapier3d::prelude::{PhysicsWorld, RigidBody, RigidBodyHandle, RigidBodyType};
@@ -122,6 +123,16 @@ impl Audit {
     /// Forgets how a body was: it is moved on purpose by something outside of the world.
     pub(crate) fn excuse(&mut self, handle: RigidBodyHandle) {
         self.seen.retain(|seen| seen.handle != handle);
+    }
+
+    /// A verdict as it stands after the audit: an episode with a violation proves nothing.
+    pub(crate) fn void(&self, verdict: OracleVerdict) -> OracleVerdict {
+        let Some(first) = self.report.first.first() else { return verdict };
+        let count = self.report.violations;
+        let mut violations = verdict.violations;
+        violations.push(format!("void: the physics audit found {count} violations, the first {first}"));
+        let explanation = format!("Void by the physics audit: {first}. {}", verdict.explanation);
+        OracleVerdict { strict: false, faithful: verdict.faithful.map(|_| false), violations, explanation, ..verdict }
     }
 
     fn tell(&mut self, now_s: f64, what: &str) {
@@ -284,6 +295,8 @@ mod tests {
         world.physics.bodies.get_mut(handle).unwrap().set_linvel(Vector::new(0.0, 0.0, 0.5), true);
         assert!(wait(&mut world, 0.1) > 0);
         assert!(world.audit().first[0].contains("nothing touched it"), "{:?}", world.audit());
+        let verdict = world.verdict();
+        assert!(!verdict.strict && verdict.explanation.starts_with("Void"), "{verdict:?}");
     }
 
     #[test]

@@ -299,14 +299,14 @@ impl World {
     /// How the episode stands. The judge looks a little further than the present, so that a stage that has to hold
     /// for a while is not missed by an agent that stops at once; the world itself does not advance.
     pub(crate) fn verdict(&mut self) -> OracleVerdict {
-        let Ok(now) = WorldState::of(self) else { return self.judge.verdict(&self.state) };
+        let Ok(now) = WorldState::of(self) else { return self.audit.void(self.judge.verdict(&self.state)) };
         let until = self.seconds() + self.judge.settle_s();
         while self.seconds() < until {
             self.step(&self.target.clone());
         }
         let verdict = self.judge.verdict(&self.state);
         now.put_into(self);
-        verdict
+        self.audit.void(verdict)
     }
 
     pub(crate) fn truth(&self) -> Vec<TrueObject> {

@@ -131,9 +131,24 @@ impl Renderer {
     /// # Errors
     /// No adapter works: the error says what to install.
     pub fn new() -> Result<Renderer, RendererError> {
+        Renderer::on_first(|_| true)
+    }
+
+    /// The best adapter of one backend, `vulkan` or `gl`: to compare drivers.
+    ///
+    /// # Errors
+    /// As [`Renderer::new`].
+    pub fn by(backend: &str) -> Result<Renderer, RendererError> {
+        Renderer::on_first(|report| report.backend == backend)
+    }
+
+    fn on_first(wanted: impl Fn(&AdapterReport) -> bool) -> Result<Renderer, RendererError> {
         let mut tried = Vec::new();
         for adapter in adapter::candidates() {
             let report = adapter::report(&adapter.get_info());
+            if !wanted(&report) {
+                continue;
+            }
             let limits = wgpu::Limits::downlevel_defaults().using_resolution(adapter.limits());
             let descriptor = wgpu::DeviceDescriptor { required_limits: limits, ..wgpu::DeviceDescriptor::default() };
             match pollster::block_on(adapter.request_device(&descriptor)) {
