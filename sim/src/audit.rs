@@ -20,6 +20,9 @@ const MAX_TOLD: usize = 8;
 const PARTED_M: f64 = 0.0015;
 /// The same as a turn, radians.
 const PARTED_RAD: f64 = 0.05;
+/// A light part in its joint, leant on with the whole wrist, is pushed askew and straightened again: so much more is
+/// possible while something that moves touches it.
+const LEANT_ON: f64 = 5.0;
 /// Shifts without a velocity may add up to this, metres, and are forgotten at the rate below.
 const DRIFT_M: f64 = 0.01;
 /// Energy that may appear without a cause, J/kg: a height of 2 mm, or 0.2 m/s.
@@ -94,7 +97,11 @@ impl Audit {
             let known = before.get(place).filter(|known| known.handle == handle);
             let known = known.or_else(|| before.iter().find(|known| known.handle == handle));
             if let Some(known) = known.filter(|known| known.kind == seen.kind && body.is_dynamic()) {
-                let found = seen.compare(known, step_s).or_else(|| seen.weigh(known, physics, robot, &before));
+                let touched = || is_touched(physics, handle, robot, &before);
+                let found = seen.compare(known, step_s, touched).or_else(|| {
+                    let jointed = is_jointed(physics, handle);
+                    seen.weigh(known, || jointed || touched())
+                });
                 if let Some(what) = found {
                     self.tell(now_s, &what);
                 }
@@ -162,14 +169,15 @@ impl Seen {
     }
 
     /// Is it where its velocity has taken it?
-    fn compare(&mut self, before: &Seen, step_s: f64) -> Option<String> {
+    fn compare(&mut self, before: &Seen, step_s: f64, touched: impl Fn() -> bool) -> Option<String> {
         let shift = self.centre - before.centre;
         let off = shift - self.velocity * step_s;
         // Within a step the velocity changes from the old to the new one.
         let fast = (self.velocity - before.velocity).length() * step_s;
         let turned = DQuat::from_scaled_axis(self.spin * step_s) * before.turn;
         let askew = turned.normalize().angle_between(self.turn.normalize());
-        if askew > PARTED_RAD + (self.spin - before.spin).length() * step_s {
+        let spun = (self.spin - before.spin).length() * step_s;
+        if askew > PARTED_RAD + spun && (askew > LEANT_ON * PARTED_RAD + spun || !touched()) {
             return Some(format!("a body was turned by {askew:.3} rad without a spin{}", self.at()));
         }
         self.drift = (before.drift + off) * REMEMBERED;
@@ -185,56 +193,45 @@ impl Seen {
     }
 
     /// Did its energy rise without a cause?
-    fn weigh(
-        &mut self,
-        before: &Seen,
-        physics: &PhysicsWorld,
-        robot: &Robot<'_>,
-        all_before: &[Seen],
-    ) -> Option<String> {
+    fn weigh(&mut self, before: &Seen, pushed: impl Fn() -> bool) -> Option<String> {
         let rise = self.energy - before.energy;
-        self.gained = before.gained * REMEMBERED;
-        if rise <= 0.0 {
-            return None;
-        }
-        self.gained += rise;
+        self.gained = before.gained * REMEMBERED + rise.max(0.0);
         if self.gained <= GAIN_J_KG {
             return None;
         }
-        self.gained = 0.0;
-        if self.is_pushed(physics, robot, all_before) {
-            return None;
-        }
-        Some(format!("a body gained {rise:.3} J/kg and nothing touched it that moves{}", self.at()))
-    }
-
-    /// Whether a joint holds it, whose spring may push it, or something touches it that moves.
-    fn is_pushed(&self, physics: &PhysicsWorld, robot: &Robot<'_>, before: &[Seen]) -> bool {
-        if physics.impulse_joints.attached_joints(self.handle).next().is_some()
-            || physics.multibody_joints.rigid_body_link(self.handle).is_some()
-        {
-            return true;
-        }
-        let moves = |other: RigidBodyHandle| {
-            let Some(body) = physics.bodies.get(other) else { return false };
-            let was = before.iter().find(|seen| seen.handle == other);
-            robot.bodies.contains(&other)
-                || body.is_kinematic()
-                || was.is_some_and(|seen| seen.velocity.length() > MOVING_M_S)
-                || body.linvel().length() > MOVING_M_S as f32
-        };
-        let Some(body) = physics.bodies.get(self.handle) else { return true };
-        body.colliders().iter().any(|collider| {
-            physics.contact_pairs_with(*collider).filter(|pair| pair.has_any_active_contact()).any(|pair| {
-                let other = if pair.collider1 == *collider { pair.collider2 } else { pair.collider1 };
-                physics.colliders.get(other).and_then(|other| other.parent()).is_some_and(moves)
-            })
-        })
+        let gained = std::mem::take(&mut self.gained);
+        let what = || format!("a body gained {gained:.3} J/kg and nothing touched it that moves{}", self.at());
+        (!pushed()).then(what)
     }
 
     fn at(&self) -> String {
         format!(", at {:.3}", self.centre)
     }
+}
+
+/// Whether a joint holds a body, whose spring may push it.
+fn is_jointed(physics: &PhysicsWorld, handle: RigidBodyHandle) -> bool {
+    physics.impulse_joints.attached_joints(handle).next().is_some()
+        || physics.multibody_joints.rigid_body_link(handle).is_some()
+}
+
+/// Whether something touches a body that moves: the robot, a third party, another body.
+fn is_touched(physics: &PhysicsWorld, handle: RigidBodyHandle, robot: &Robot<'_>, before: &[Seen]) -> bool {
+    let moves = |other: RigidBodyHandle| {
+        let Some(body) = physics.bodies.get(other) else { return false };
+        let was = before.iter().find(|seen| seen.handle == other);
+        robot.bodies.contains(&other)
+            || body.is_kinematic()
+            || was.is_some_and(|seen| seen.velocity.length() > MOVING_M_S)
+            || f64::from(body.linvel().length()) > MOVING_M_S
+    };
+    let Some(body) = physics.bodies.get(handle) else { return true };
+    body.colliders().iter().any(|collider| {
+        physics.contact_pairs_with(*collider).filter(|pair| pair.has_any_active_contact()).any(|pair| {
+            let other = if pair.collider1 == *collider { pair.collider2 } else { pair.collider1 };
+            physics.colliders.get(other).and_then(|other| other.parent()).is_some_and(moves)
+        })
+    })
 }
 
 #[cfg(test)]

@@ -10,7 +10,7 @@ use acm_concept::{
     embodiment::{Command, Embodiment},
     pose::Pose,
 };
-use acm_sim::{Scenario, SharedRenderer, SimOptions, Simulation, Snapshot};
+use acm_sim::{AuditReport, Scenario, SharedRenderer, SimOptions, Simulation, Snapshot};
 use glam::{DQuat, DVec3};
 use std::sync::{Arc, Mutex};
 
@@ -35,10 +35,14 @@ pub fn measure(args: &BenchArgs, result: &mut BenchResult) -> anyhow::Result<()>
     let (mut mismatches, mut seen, mut violations) = (0, 0, 0);
     let bar = progress("restore points", points as u64);
     for seed in 0..episodes {
-        let found = episode(&worlds[seed % worlds.len()], seed as u64, renderer.as_ref())?;
+        let world = &worlds[seed % worlds.len()];
+        let found = episode(world, seed as u64, renderer.as_ref())?;
         mismatches += found.mismatches;
         seen += found.seen;
-        violations += found.violations;
+        violations += found.audit.violations;
+        result
+            .notes
+            .extend(found.audit.first.iter().map(|told| format!("audit, {} seed {seed}: {told}", world.name())));
         bar.inc(POINTS_AN_EPISODE as u64);
     }
     bar.finish_and_clear();
@@ -58,7 +62,7 @@ pub fn measure(args: &BenchArgs, result: &mut BenchResult) -> anyhow::Result<()>
 struct Found {
     mismatches: usize,
     seen: usize,
-    violations: u64,
+    audit: AuditReport,
 }
 
 /// A moment to come back to, and how the world went on from there.
@@ -124,7 +128,7 @@ fn episode(scenario: &Scenario, seed: u64, renderer: Option<&SharedRenderer>) ->
         }
     }
     let mut second = Player::new(scenario, seed, renderer)?;
-    let mut found = Found { violations: first.simulation.audit().violations, ..Found::default() };
+    let mut found = Found { audit: first.simulation.audit(), ..Found::default() };
     // Backwards, so that nothing follows from where the last one ended.
     for number in (0..points.len()).rev() {
         let point = &points[number];
