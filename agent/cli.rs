@@ -7,6 +7,7 @@ use acm_actors::{
     remote::{Address, FrameMode},
     trace::FrameDetail,
 };
+use acm_sim::Setting;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::{path::PathBuf, process::ExitCode, str::FromStr};
 
@@ -162,7 +163,7 @@ pub struct RunArgs {
     /// Template files instead of the built-in library.
     #[arg(long, value_name = "DIR")]
     pub library: Option<PathBuf>,
-    /// A fault: black-frames, freeze-frames, wipe-memory@EVENT, slip@N. May be given more than once.
+    /// A fault: black-frames, freeze-frames, wipe-memory@EVENT, slip@N, drop@N. May be given more than once.
     #[arg(long, value_name = "FAULT")]
     pub inject: Vec<Injection>,
     /// Refuse every motion, as on a robot that must not move.
@@ -171,6 +172,9 @@ pub struct RunArgs {
     /// Another sensor profile than the scenario's: none, d435, d435-hard.
     #[arg(long, value_name = "PROFILE")]
     pub sensor: Option<String>,
+    /// Set a field of the scenario otherwise, as in robot.model=panda. May be given more than once.
+    #[arg(long, value_name = "PATH=VALUE", conflicts_with = "robot")]
+    pub set: Vec<Setting>,
     /// Write every message, effect and change of memory into this MCAP file. Of a range, or in a folder, each run has
     /// a file of its own.
     #[arg(long, value_name = "FILE")]
@@ -264,6 +268,9 @@ pub enum ScenarioCommand {
         /// The seed.
         #[arg(long, default_value_t = 0)]
         seed: u64,
+        /// Set a field of the scenario otherwise, as in robot.model=panda. May be given more than once.
+        #[arg(long, value_name = "PATH=VALUE")]
+        set: Vec<Setting>,
         /// The PNG to write.
         #[arg(short, long, value_name = "PNG")]
         out: PathBuf,
@@ -294,10 +301,13 @@ pub struct ServeArgs {
     /// Another sensor profile than the scenario's: none, d435, d435-hard.
     #[arg(long, value_name = "PROFILE")]
     pub sensor: Option<String>,
+    /// Set a field of the scenario otherwise, as in robot.model=panda. May be given more than once.
+    #[arg(long, value_name = "PATH=VALUE")]
+    pub set: Vec<Setting>,
     /// How frames go to the agent: auto, shared-memory, inline.
     #[arg(long, value_name = "WAY", default_value = "auto")]
     pub frames: FrameMode,
-    /// A fault of the world: slip@N.
+    /// A fault of the world: slip@N or drop@N.
     #[arg(long, value_name = "FAULT")]
     pub inject: Vec<Injection>,
     /// Refuse every motion.

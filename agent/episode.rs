@@ -182,6 +182,7 @@ impl Runner {
         let options = SimOptions {
             seed,
             slip_at: config.faults.slip_at,
+            drop_at: config.faults.drop_at,
             sensor: config.sensor.clone(),
             motion: !config.no_motion,
             camera_size: None,

@@ -18,6 +18,8 @@ pub enum Injection {
     WipeMemory(WipeAt),
     /// What the hand carries is taken out of it unseen, during its nth carry from 1.
     Slip(u32),
+    /// The fingers open for a moment during the nth carry from 1, and what they carry falls.
+    Drop(u32),
     /// An actor fails when it is about to handle its nth message from 1. Left out of the help: it is for tests.
     Panic {
         /// The actor's role.
@@ -37,9 +39,10 @@ impl FromStr for Injection {
                 .parse()
                 .map(Injection::WipeMemory)
                 .map_err(|e: acm_actors::episode::ParseEventError| e.to_string()),
-            Some(("slip", carry)) => match carry.parse() {
-                Ok(carry) if carry > 0 => Ok(Injection::Slip(carry)),
-                _ => Err(format!("`{carry}` is no number of a carry: write slip@1 for the first")),
+            Some((mishap @ ("slip" | "drop"), carry)) => match carry.parse() {
+                Ok(carry) if carry > 0 && mishap == "slip" => Ok(Injection::Slip(carry)),
+                Ok(carry) if carry > 0 => Ok(Injection::Drop(carry)),
+                _ => Err(format!("`{carry}` is no number of a carry: write {mishap}@1 for the first")),
             },
             Some(("panic", at)) => {
                 match at.split_once(':').map(|(role, message)| (role.to_string(), message.parse())) {
@@ -49,7 +52,7 @@ impl FromStr for Injection {
                     _ => Err(format!("`{at}` is no message of an actor: write panic@perception:3")),
                 }
             }
-            _ => Err(format!("`{text}` is no fault: black-frames, freeze-frames, wipe-memory@EVENT or slip@N")),
+            _ => Err(format!("`{text}` is no fault: black-frames, freeze-frames, wipe-memory@EVENT, slip@N or drop@N")),
         }
     }
 }
@@ -65,6 +68,8 @@ pub struct Faults {
     pub wipe_at: Option<WipeAt>,
     /// See [`Injection::Slip`].
     pub slip_at: Option<u32>,
+    /// See [`Injection::Drop`].
+    pub drop_at: Option<u32>,
     /// See [`Injection::Panic`].
     pub panic_at: Option<(String, u64)>,
 }
@@ -79,6 +84,7 @@ impl Faults {
                 Injection::FreezeFrames => faults.freeze_frames = true,
                 Injection::WipeMemory(event) => faults.wipe_at = Some(event.clone()),
                 Injection::Slip(carry) => faults.slip_at = Some(*carry),
+                Injection::Drop(carry) => faults.drop_at = Some(*carry),
                 Injection::Panic { role, message } => faults.panic_at = Some((role.clone(), *message)),
             }
         }
@@ -172,7 +178,7 @@ mod tests {
 
     #[test]
     fn faults_are_read_and_mistakes_named() {
-        assert_eq!("slip@2".parse(), Ok(Injection::Slip(2)));
+        assert_eq!(["slip@2", "drop@1"].map(str::parse), [Ok(Injection::Slip(2)), Ok(Injection::Drop(1))]);
         assert_eq!("wipe-memory@instruction".parse(), Ok(Injection::WipeMemory(WipeAt::Instruction)));
         assert_eq!("panic@memory:4".parse(), Ok(Injection::Panic { role: "memory".into(), message: 4 }));
         for bad in

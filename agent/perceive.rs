@@ -118,6 +118,7 @@ fn no_robot(header: &FrameHeader) -> Feedback {
         commanded_opening_m: 0.0,
         pad_force_n: [DVec3::ZERO; 2],
         wrist_force_n: DVec3::ZERO,
+        ..Feedback::default()
     }
 }
 

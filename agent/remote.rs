@@ -30,8 +30,8 @@ pub fn run(args: &RunArgs) -> anyhow::Result<Exit> {
     let (config, library) = prepare(args)?;
     let config = traced(FILE_STEM, args, &config, args.seed.first);
     ensure!(
-        config.faults.slip_at.is_none(),
-        "slip@N happens in the world: give it to its host, such as `acm sim serve --inject slip@N`"
+        config.faults.slip_at.or(config.faults.drop_at).is_none(),
+        "slip@N and drop@N happen in the world: give them to its host, such as `acm sim serve --inject slip@N`"
     );
     let robot = RemoteRobot::connect(address, AGENT, args.frames)?;
     let runner = Runner::without_renderer(library)?;

@@ -25,7 +25,7 @@ use std::{
 /// Runs `acm run`.
 pub fn run(args: &RunArgs) -> anyhow::Result<Exit> {
     let Some(scenario) = &args.scenario else { return remote::run(args) };
-    let scenario = Scenario::open(scenario)?;
+    let scenario = Scenario::open_with(scenario, &args.set)?;
     let video = args.video.as_deref().map(|path| VideoFile::create(path, args.seed.range)).transpose()?;
     let (config, library) = prepare(args)?;
     let runner = Runner::with_library(library)?;

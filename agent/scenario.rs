@@ -1,7 +1,7 @@
 //! `acm scenario`: list, check, describe, draw.
 
 use crate::cli::{Exit, ScenarioCommand};
-use acm_sim::{Scenario, SimOptions, Simulation};
+use acm_sim::{Scenario, Setting, SimOptions, Simulation};
 use anyhow::Context;
 use std::{
     io::Write,
@@ -18,7 +18,7 @@ pub fn run(command: &ScenarioCommand) -> anyhow::Result<Exit> {
             println!("{file}: scenario `{}` is well formed: {}", scenario.name(), scenario.summary());
         }
         ScenarioCommand::Schema => println!("{}", Scenario::schema()),
-        ScenarioCommand::Preview { file, seed, out, info } => preview(file, *seed, out, *info)?,
+        ScenarioCommand::Preview { file, seed, set, out, info } => preview(file, *seed, set, out, *info)?,
     }
     Ok(Exit::Success)
 }
@@ -32,8 +32,8 @@ fn list() -> anyhow::Result<()> {
     Ok(())
 }
 
-fn preview(file: &str, seed: u64, out: &Path, info: bool) -> anyhow::Result<()> {
-    let scenario = Scenario::open(file)?;
+fn preview(file: &str, seed: u64, set: &[Setting], out: &Path, info: bool) -> anyhow::Result<()> {
+    let scenario = Scenario::open_with(file, set)?;
     let renderer = Arc::new(Mutex::new(acm_render::Renderer::new()?));
     let options = SimOptions { seed, motion: true, ..SimOptions::default() };
     let simulation = Simulation::new(&scenario, &options, renderer)?;
@@ -44,7 +44,7 @@ fn preview(file: &str, seed: u64, out: &Path, info: bool) -> anyhow::Result<()> 
         .with_context(|| format!("the picture {} cannot be written", out.display()))?;
     println!("{} seed {seed} -> {}", scenario.name(), out.display());
     if info {
-        for object in simulation.truth() {
+        for (object, (_, lines)) in simulation.truth().into_iter().zip(simulation.inventory()) {
             let at = object.pose.translation;
             println!(
                 "  {:<12} {:<14} at ({:.3}, {:.3}, {:.3}) heading {:.1} deg",
@@ -55,6 +55,9 @@ fn preview(file: &str, seed: u64, out: &Path, info: bool) -> anyhow::Result<()> 
                 at.z,
                 object.pose.yaw().to_degrees()
             );
+            for line in lines {
+                println!("    {line}");
+            }
         }
     }
     Ok(())

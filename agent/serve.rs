@@ -14,17 +14,18 @@ use std::{
 
 /// Serves a scenario's world until the process is interrupted.
 pub fn run(args: &ServeArgs) -> anyhow::Result<Exit> {
-    let scenario = Scenario::open(&args.scenario)?;
+    let scenario = Scenario::open_with(&args.scenario, &args.set)?;
     let faults = Faults::new(&args.inject);
     ensure!(
-        faults == Faults { slip_at: faults.slip_at, ..Faults::default() },
-        "only slip@N happens in the world: give the other faults to `acm run`"
+        faults == Faults { slip_at: faults.slip_at, drop_at: faults.drop_at, ..Faults::default() },
+        "only slip@N and drop@N happen in the world: give the other faults to `acm run`"
     );
     // The address is taken first: one that is in use must not cost the start of the renderer.
     let server = RobotServer::bind(&args.listen, args.frames)?;
     let options = SimOptions {
         seed: args.seed,
         slip_at: faults.slip_at,
+        drop_at: faults.drop_at,
         sensor: args.sensor.clone(),
         motion: !args.no_motion,
         camera_size: None,

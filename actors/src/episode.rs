@@ -1,5 +1,6 @@
 //! The closed loop (the paper's Algorithm 1) as one actor: look, decide, act, verify, write back.
 
+mod asked;
 mod state;
 
 use crate::{
@@ -19,6 +20,7 @@ use acm_runtime::{
     core::{Core, CoreError, Outbox},
     envelope::{Envelope, OUTSIDE},
 };
+use asked::Asked;
 use state::{Doing, Pending};
 pub use state::{ParseEventError, Until, WipeAt};
 
@@ -33,7 +35,7 @@ const MAX_RESTARTS: u32 = 4;
 
 /// The episode loop's core.
 pub struct Episode {
-    task_spec: TaskSpec,
+    asked: Asked,
     wipe_at: Option<WipeAt>,
     until: Option<Until>,
     doing: Doing,
@@ -46,7 +48,6 @@ pub struct Episode {
     step: Option<(Step, Box<SkillInvocation>)>,
     /// The transition that waits for its verdict.
     pending: Option<Pending>,
-    deadline: Time,
     report: EpisodeReport,
 }
 
@@ -54,8 +55,7 @@ impl Episode {
     /// An episode of the given task. With `wipe_at`, memory is wiped once at that event: a fault for tests.
     pub fn new(task_spec: TaskSpec, wipe_at: Option<WipeAt>) -> Episode {
         Episode {
-            deadline: Time::from_seconds(task_spec.instruction_at_s + task_spec.budgets.seconds),
-            task_spec,
+            asked: Asked::new(task_spec),
             wipe_at,
             until: None,
             doing: Doing::Starting,
@@ -68,6 +68,7 @@ impl Episode {
             report: EpisodeReport {
                 ending: Ending::Interrupted,
                 steps: Vec::new(),
+                instructions_done: 0,
                 subtasks_done: 0,
                 subtasks: 0,
                 frames_perceived: 0,
@@ -126,8 +127,9 @@ impl Episode {
 
     /// Clears the camera's view, then takes a frame into account.
     fn look(&mut self, reason: &str, out: &mut Outbox<Message>) {
-        if self.report.frames_perceived >= self.task_spec.budgets.frames {
-            let frames = self.task_spec.budgets.frames;
+        // Before an instruction nothing is asked that could use a budget up.
+        if self.asked.frames_left(self.report.frames_perceived) == 0 {
+            let frames = self.asked.frames();
             return self.give_up(GiveUpCause::Budget, format!("the budget of {frames} frames is used up"), out);
         }
         let nouns = self.task.as_ref().map(|task| task.nouns.clone()).unwrap_or_default();
@@ -158,14 +160,14 @@ impl Episode {
     // --- understanding ------------------------------------------------------------------------------------------
 
     fn instruction_is_due(&self, out: &Outbox<Message>) -> bool {
-        Time(out.time_ns()) >= Time::from_seconds(self.task_spec.instruction_at_s)
+        self.asked.is_due(Time(out.time_ns()))
     }
 
     fn parse(&mut self, out: &mut Outbox<Message>) {
         if let Some(event @ Until::Instruction) = self.until {
             return self.end(Ending::Until { event }, out);
         }
-        let instruction = self.task_spec.instruction.clone();
+        let instruction = self.asked.text().to_owned();
         self.send(Doing::Parsing, PLANNER, Message::Parse { instruction }, out);
     }
 
@@ -181,8 +183,19 @@ impl Episode {
     }
 
     fn instruct(&mut self, out: &mut Outbox<Message>) {
-        let (time, text) = (Time(out.time_ns()), self.task_spec.instruction.clone());
+        let (time, text) = (Time(out.time_ns()), self.asked.text().to_owned());
         self.send(Doing::Instructing, MEMORY, Message::Note(Note::Instructed { time, text }), out);
+    }
+
+    /// What was asked is done: the next instruction, or the end.
+    fn instruction_done(&mut self, out: &mut Outbox<Message>) {
+        let used = (self.report.frames_perceived, self.report.steps.len() as u32);
+        self.report.instructions_done = self.asked.done_before() + 1;
+        if !self.asked.go_on(Time(out.time_ns()), used) {
+            return self.end(Ending::Done, out);
+        }
+        (self.task, self.looks) = (None, 0);
+        self.clear_view(out);
     }
 
     // --- deciding -----------------------------------------------------------------------------------------------
@@ -196,8 +209,8 @@ impl Episode {
             time: Time(out.time_ns()),
             feedback,
             looks: self.looks,
-            deadline: self.deadline,
-            skills_left: self.task_spec.budgets.skills.saturating_sub(self.report.steps.len() as u32),
+            deadline: self.asked.deadline(),
+            skills_left: self.asked.skills_left(self.report.steps.len() as u32),
         });
         self.send(Doing::Deciding, PLANNER, Message::Decide { task, situation, view }, out);
     }
@@ -240,7 +253,7 @@ impl Episode {
                 let note = Note::SubtaskDone { time: Time(out.time_ns()), index };
                 self.send(Doing::Noting, MEMORY, Message::Note(note), out);
             }
-            Decision::Done { .. } => self.end(Ending::Done, out),
+            Decision::Done { .. } => self.instruction_done(out),
             Decision::GiveUp { unknown } => self.give_up(unknown.cause, unknown.text, out),
         }
         Ok(())
@@ -293,7 +306,7 @@ impl Episode {
         match self.doing {
             Doing::Beginning if self.instruction_is_due(out) => {
                 // Who joins a world after that moment is told now, and has the whole budget from now on.
-                self.deadline = self.deadline.max(Time(out.time_ns()) + self.task_spec.budgets.seconds);
+                self.asked.begins_late(Time(out.time_ns()));
                 self.parse(out);
             }
             Doing::Beginning => self.look("watching before the instruction", out),

@@ -78,6 +78,6 @@ impl Core<Message> for HostPort {
 }
 
 fn refusal(error: &EmbodimentError) -> Message {
-    let fatal = !matches!(error, EmbodimentError::Refused { .. });
+    let fatal = !matches!(error, EmbodimentError::Refused { .. } | EmbodimentError::ProtectiveStop { .. });
     Message::Refused { reason: error.to_string(), fatal }
 }

@@ -43,7 +43,7 @@ impl Core<Message> for PerceptionActor {
                 };
                 let mut expectation = self.expectation.take().unwrap_or_default();
                 expectation.time = header.time;
-                expectation.robot = self.robot.solids(&feedback.tcp, feedback.opening_m);
+                expectation.robot = self.robot.body(&feedback);
                 let percepts = Box::new(self.grounder.ground(&frame, &expectation));
                 outbox.send(MEMORY, Message::Percepts { percepts, feedback });
             }

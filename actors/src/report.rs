@@ -86,7 +86,9 @@ pub struct EpisodeReport {
     pub ending: Ending,
     /// The skills that were run, in order.
     pub steps: Vec<StepRecord>,
-    /// Subtasks found done.
+    /// Instructions found done.
+    pub instructions_done: u32,
+    /// Subtasks of the last instruction that are done.
     pub subtasks_done: u32,
     /// Subtasks of the instruction; 0 if it was not understood.
     pub subtasks: u32,

@@ -204,7 +204,7 @@ fn seen_in(frame: FrameId) -> acm_memory::entry::PlaceCause {
 }
 
 fn looks_the_same(a: &ObjectEntry, b: &ObjectEntry, view: &dyn MemoryView) -> bool {
-    let size = |object| words::extents(object, view.library());
+    let size = |object: &ObjectEntry| view.library().extents_of(&object.parts);
     let (Some(one), Some(other)) = (size(a), size(b)) else { return false };
     a.category == b.category
         && (one - other).abs().max_element() < SAME_SIZE_M

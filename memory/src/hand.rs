@@ -20,6 +20,8 @@ pub enum HandFeeling {
 const TOUCH_N: f64 = 0.3;
 /// Both pads feel at least this when something is gripped, newtons.
 const GRIP_N: f64 = 0.5;
+/// A cup with this share of the pump's best vacuum is closed by something.
+const SEALED: f64 = 0.5;
 /// Fingers nearer than this touch each other, metres.
 const SHUT_M: f64 = 0.002;
 /// Fingers that nothing stops come this near to the commanded opening, metres.
@@ -29,6 +31,9 @@ impl HandFeeling {
     /// Reads one feedback. Shut fingers press on each other, so they count as empty whatever the pads feel.
     pub fn from_feedback(feedback: &Feedback) -> HandFeeling {
         let [left, right] = feedback.pad_force_n;
+        if feedback.vacuum >= SEALED {
+            return HandFeeling::Something;
+        }
         if feedback.opening_m < SHUT_M {
             return HandFeeling::Empty;
         }
@@ -50,6 +55,9 @@ mod tests {
     fn a_stopped_finger_pair_with_force_holds_something() {
         assert_eq!(HandFeeling::from_feedback(&open_hand(0.0)), HandFeeling::Empty);
         assert_eq!(HandFeeling::from_feedback(&gripping_hand(0.0)), HandFeeling::Something);
+        let sealed = Feedback { opening_m: 0.0, vacuum: 0.9, ..open_hand(0.0) };
+        assert_eq!(HandFeeling::from_feedback(&sealed), HandFeeling::Something);
+        assert_eq!(HandFeeling::from_feedback(&Feedback { vacuum: 0.1, ..sealed }), HandFeeling::Empty);
         let mut shut = gripping_hand(0.0);
         shut.opening_m = 0.001;
         assert_eq!(HandFeeling::from_feedback(&shut), HandFeeling::Empty);

@@ -150,6 +150,7 @@ pub fn open_hand(seconds: f64) -> Feedback {
         commanded_opening_m: 0.08,
         pad_force_n: [DVec3::ZERO; 2],
         wrist_force_n: DVec3::ZERO,
+        ..Feedback::default()
     }
 }
 
@@ -252,6 +253,7 @@ pub fn report(view: &dyn MemoryView, skill: &str, object: ObjectId, ended_s: f64
         obstacles: Vec::new(),
         support_height_m: 0.0,
         held: None,
+        held_solids: vec![],
         attempt: 0,
     };
     let report = SkillReport {

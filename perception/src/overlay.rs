@@ -7,7 +7,7 @@ use crate::{expected, labels};
 use acm_concept::{
     camera::RgbdFrame,
     object::{Blindness, GroundedObject, Observability, Percepts},
-    solid::Solid,
+    solid::{PlacedSolid, Solid},
     template::TemplateLibrary,
 };
 use font::Font;
@@ -92,21 +92,19 @@ const PALETTE: [Rgb<u8>; 10] = [
     Rgb([200, 230, 100]),
 ];
 
-/// Length, width and height, or diameter and height, of the main part, and the confidence in per cent.
+/// Length, width and height, or diameter and height of a single cylinder, and the confidence in per cent.
 fn size_text(object: &GroundedObject, library: &TemplateLibrary) -> String {
     let Some(part) = object.parts.first() else { return String::new() };
     let unsure = part.parameters.iter().any(|p| !matches!(p.observability, Observability::Observed));
     let flat = library.get(&part.template).is_some_and(|t| t.parameters.iter().any(|p| p.fixed));
     let mark = if unsure && !flat { "~" } else { "" };
     let centimetres = |metres: f64| format!("{:.1}", metres * 100.0);
-    let size = match expected::solids(&object.parts, library).first().map(|s| s.solid) {
-        Some(Solid::Box { size }) => {
-            format!("{}x{}x{}", centimetres(size.x), centimetres(size.y), centimetres(size.z))
+    let size = match (expected::solids(&object.parts, library).as_slice(), library.extents_of(&object.parts)) {
+        ([PlacedSolid { solid: Solid::Cylinder { radius, height }, .. }], _) => {
+            format!("D{}x{}", centimetres(2.0 * radius), centimetres(*height))
         }
-        Some(Solid::Cylinder { radius, height }) => {
-            format!("D{}x{}", centimetres(2.0 * radius), centimetres(height))
-        }
-        None => part.template.clone(),
+        (_, Some(size)) => size.to_array().map(centimetres).join("x"),
+        (_, None) => part.template.clone(),
     };
     format!("{mark}{size}cm {:.0}%", object.confidence * 100.0)
 }

@@ -1,172 +1,222 @@
-//! Objects as bodies of the engine, and the one mechanism there is so far: a cap on a spring.
+//! Objects in the engine: a body for each part that moves, and what can be known of them.
 
 use crate::{
+    articulation::{Articulation, ArticulationState, let_pass},
+    contact::Contacts,
     convert::{from_engine, to_engine, vector},
-    layout::{BuiltSolid, Placed, shape},
-    model::ButtonModel,
-    report::TrueObject,
-    world::World,
+    model::{Link, Piece, Weight, joint::Follows, variables::OF_OBJECT},
+    oracle::Watch,
+    placed::Placed,
 };
-use acm_concept::pose::Pose;
+use acm_concept::pose::{Pose, wrap_angle};
 use glam::DVec3;
 use rapier3d::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// An object in the engine. The body's frame is the object's base frame.
+/// An object in the engine. Its frame is the object's base frame.
 #[derive(Debug, Clone)]
 pub(crate) struct Body {
     pub(crate) placed: Placed,
+    /// Of its base.
     pub(crate) handle: RigidBodyHandle,
+    /// Of the body with which each link moves, in the order of the links.
+    carriers: Vec<RigidBodyHandle>,
+    /// Of all links.
     pub(crate) colliders: Vec<ColliderHandle>,
-    pub(crate) button: Option<Button>,
+    /// Links and their joints, in the order of the links.
+    pub(crate) joints: Vec<(usize, Articulation)>,
+    /// Names of lamps and gauges, and what they show.
+    shows: Vec<(String, Watch)>,
     /// Whether it is one of several copies, which the judge cannot name.
     pub(crate) is_copy: bool,
     /// Where it stood when the episode began.
     pub(crate) start: Pose,
 }
 
-/// A cap that goes down against a spring and is counted as pressed once per stroke.
-#[derive(Debug, Clone)]
-pub(crate) struct Button {
-    model: ButtonModel,
-    pub(crate) cap: RigidBodyHandle,
-    pub(crate) pressed: bool,
-    pub(crate) presses: u32,
-    armed: bool,
-}
-
 impl Body {
     pub(crate) fn insert(world: &mut PhysicsWorld, placed: Placed, is_copy: bool) -> Body {
-        let pose = to_engine(&placed.pose);
         let builder = if placed.fixed { RigidBodyBuilder::fixed() } else { RigidBodyBuilder::dynamic() };
-        let handle = world.insert_body(builder.pose(pose));
-        let mut colliders = insert_solids(world, &placed.solids, handle, &placed, Weight::Density(placed.density));
-        let button = placed.button.clone().map(|model| {
-            let (button, caps) = Button::insert(world, &placed, handle, model);
-            colliders.extend(caps);
-            button
-        });
-        let start = placed.pose;
-        Body { placed, handle, colliders, button, is_copy, start }
+        let handle = world.insert_body(builder.pose(to_engine(&placed.pose)));
+        let mut body = Body {
+            handle,
+            carriers: Vec::new(),
+            colliders: Vec::new(),
+            joints: Vec::new(),
+            shows: Vec::new(),
+            is_copy,
+            start: placed.pose,
+            placed,
+        };
+        let starts = body.placed.start_poses();
+        for (at, start) in starts.iter().enumerate() {
+            body.insert_link(world, at, start);
+        }
+        for (first, second) in &body.placed.passing {
+            let_pass(world, body.carriers[*first], body.carriers[*second]);
+        }
+        body
+    }
+
+    fn insert_link(&mut self, world: &mut PhysicsWorld, at: usize, start: &Pose) {
+        let link = &self.placed.links[at];
+        let parent = self.carriers.get(link.parent).copied().unwrap_or(self.handle);
+        let carrier = match &link.joint {
+            None => parent,
+            Some(joint) => {
+                let pose = to_engine(&(self.placed.pose * *start));
+                let builder = RigidBodyBuilder::dynamic().pose(pose).can_sleep(!Articulation::is_alive(joint));
+                world.insert_body(if link.volume() > 0.0 {
+                    builder
+                } else {
+                    builder.additional_mass_properties(ghost(link))
+                })
+            }
+        };
+        self.colliders.extend(insert_pieces(world, link, carrier));
+        if let Some(joint) = &link.joint {
+            self.joints.push((at, Articulation::insert(world, parent, carrier, joint)));
+        }
+        self.carriers.push(carrier);
+    }
+
+    /// Gives its lamps and gauges what they show.
+    pub(crate) fn set_shows(&mut self, shows: Vec<(String, Watch)>) {
+        self.shows = shows;
     }
 
     /// Pose of its base frame.
     pub(crate) fn pose(&self, world: &PhysicsWorld) -> Pose {
         world.bodies.get(self.handle).map_or(self.placed.pose, |body| from_engine(body.position()))
     }
-    /// Pose in which its cap's solids are.
-    pub(crate) fn cap_pose(&self, world: &PhysicsWorld) -> Option<Pose> {
-        let button = self.button.as_ref()?;
-        world.bodies.get(button.cap).map(|body| from_engine(body.position()))
+    /// Pose of a link's frame.
+    pub(crate) fn link_pose(&self, world: &PhysicsWorld, link: usize) -> Pose {
+        let body = self.carriers.get(link).and_then(|handle| world.bodies.get(*handle));
+        body.map_or_else(|| self.pose(world), |body| from_engine(body.position()))
     }
     /// Speed in metres per second and spin in radians per second.
     pub(crate) fn speed(&self, world: &PhysicsWorld) -> (f64, f64) {
         let Some(body) = world.bodies.get(self.handle) else { return (0.0, 0.0) };
         (f64::from(body.linvel().length()), f64::from(body.angvel().length()))
     }
-    /// How deep its cap is, metres; 0 without one.
-    pub(crate) fn depth(&self, world: &PhysicsWorld) -> f64 {
-        let Some(cap) = self.cap_pose(world) else { return 0.0 };
-        -(self.pose(world).inverse() * cap).translation.z
+    /// Handles of the bodies that move with it: its base and its links.
+    pub(crate) fn handles(&self) -> impl Iterator<Item = RigidBodyHandle> {
+        let links = self.placed.links.iter().zip(&self.carriers).filter(|(link, _)| link.joint.is_some());
+        std::iter::once(self.handle).chain(links.map(|(_, handle)| *handle))
     }
 
-    /// Counts a press when the cap has gone down far enough since it was last up.
-    pub(crate) fn count_presses(&mut self, world: &PhysicsWorld) {
-        let depth = self.depth(world);
-        let Some(button) = &mut self.button else { return };
-        if button.armed && depth > button.model.pressed_m {
-            button.armed = false;
-            button.pressed = true;
-            button.presses += 1;
-        } else if depth < button.model.rearmed_m {
-            button.armed = true;
-            button.pressed = false;
+    /// The body with which a link moves.
+    #[cfg(test)]
+    pub(crate) fn carrier(&self, link: usize) -> RigidBodyHandle {
+        self.carriers[link]
+    }
+
+    /// Lets its mechanisms act before a physics step. `state` holds the judge's variables.
+    pub(crate) fn act(&self, world: &mut PhysicsWorld, state: &[f64]) {
+        let position = |link: usize| self.joints.iter().find(|(at, _)| *at == link).map_or(0.0, |(_, j)| j.position);
+        for (link, joint) in &self.joints {
+            let target = match joint.joint.follows {
+                Some(Follows::Expression(_)) => self.shown(&self.placed.links[*link].name, state),
+                _ => joint.follows(position),
+            };
+            joint.act(world, target);
+        }
+    }
+
+    /// Reads where its joints are after a physics step.
+    pub(crate) fn measure(&mut self, world: &PhysicsWorld) {
+        for (_, joint) in &mut self.joints {
+            joint.measure(world);
+        }
+    }
+
+    /// What a lamp or a gauge shows now.
+    fn shown(&self, name: &str, state: &[f64]) -> Option<f64> {
+        let (_, watch) = self.shows.iter().find(|(known, _)| known == name)?;
+        watch.value(state)
+    }
+
+    /// Colour of a piece now.
+    pub(crate) fn color(&self, piece: &Piece, state: &[f64]) -> [u8; 3] {
+        let Some(lamp) = &piece.lamp else { return piece.color };
+        let value = self.shown(&lamp.name, state).unwrap_or(0.0);
+        // A value below 1 is off; one beyond the colours shows the last.
+        let place = (value.floor().max(0.0) as usize).min(lamp.colors.len());
+        place.checked_sub(1).and_then(|place| lamp.colors.get(place)).copied().unwrap_or(piece.color)
+    }
+
+    /// Writes the values of its variables, in the order of [`crate::model::variables::own`].
+    pub(crate) fn values(&self, world: &PhysicsWorld, contacts: &Contacts, values: &mut Vec<f64>) {
+        let pose = self.pose(world);
+        let (speed, spin) = self.speed(world);
+        let up = pose.transform_vector(DVec3::Z);
+        let of_object: [f64; OF_OBJECT.len()] = [
+            pose.translation.x,
+            pose.translation.y,
+            pose.translation.z,
+            speed,
+            spin,
+            up.z.clamp(-1.0, 1.0).acos(),
+            pose.translation.distance(self.start.translation),
+            wrap_angle(pose.yaw() - self.start.yaw()).abs(),
+            contacts.pads_touching(&self.colliders) as f64,
+        ];
+        values.extend(of_object);
+        let number = |truth: bool| f64::from(u8::from(truth));
+        if let Some((_, counter)) = self.joints.iter().find(|(_, joint)| joint.joint.press.is_some()) {
+            values.extend([number(counter.pressed), f64::from(counter.presses), counter.depth()]);
+        }
+        for (_, joint) in &self.joints {
+            values.extend([joint.position, joint.speed, joint.joint.opened(joint.position)]);
+            if joint.joint.press.is_some() {
+                values.extend([number(joint.pressed), f64::from(joint.presses)]);
+            }
+            if joint.joint.latch.is_some() {
+                values.push(number(joint.is_latched()));
+            }
         }
     }
 }
 
-/// What an object changes while the world runs, apart from its body.
+/// What an object changes while the world runs, apart from its bodies.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct BodyState {
     start: Pose,
-    /// Pressed, presses, armed.
-    button: Option<(bool, u32, bool)>,
+    joints: Vec<ArticulationState>,
 }
 
 impl Body {
     pub(crate) fn state(&self) -> BodyState {
-        let button = self.button.as_ref().map(|button| (button.pressed, button.presses, button.armed));
-        BodyState { start: self.start, button }
+        BodyState { start: self.start, joints: self.joints.iter().map(|(_, joint)| joint.state()).collect() }
     }
     pub(crate) fn set_state(&mut self, state: BodyState) {
         self.start = state.start;
-        if let (Some(button), Some(saved)) = (&mut self.button, state.button) {
-            (button.pressed, button.presses, button.armed) = saved;
+        for ((_, joint), saved) in self.joints.iter_mut().zip(state.joints) {
+            joint.set_state(saved);
         }
     }
 }
 
-impl Button {
-    fn insert(
-        world: &mut PhysicsWorld,
-        placed: &Placed,
-        base: RigidBodyHandle,
-        model: ButtonModel,
-    ) -> (Button, Vec<ColliderHandle>) {
-        let builder = RigidBodyBuilder::dynamic().pose(to_engine(&placed.pose)).can_sleep(false);
-        let cap = world.insert_body(builder);
-        let weight = Weight::Mass(model.mass_kg / placed.cap.len().max(1) as f64);
-        let colliders = insert_solids(world, &placed.cap, cap, placed, weight);
-        // The spring's rest position lies above the stop: that is its preload. Its damping lets a free cap come
-        // back at the given speed.
-        let rest = model.preload_n / model.stiffness_n_m;
-        let mid_force = model.preload_n + 0.5 * model.stiffness_n_m * model.travel_m;
-        let joint = PrismaticJointBuilder::new(vector(DVec3::Z))
-            .limits([-model.travel_m as f32, 0.0])
-            .contacts_enabled(false)
-            .motor_model(MotorModel::ForceBased)
-            .motor_position(rest as f32, model.stiffness_n_m as f32, (mid_force / model.return_speed_m_s) as f32);
-        world.insert_impulse_joint(base, cap, joint);
-        (Button { model, cap, pressed: false, presses: 0, armed: true }, colliders)
-    }
+/// Mass of a link that is seen and not felt, such as a burner's glow: that of a ball in its middle.
+fn ghost(link: &Link) -> MassProperties {
+    const MASS_KG: f32 = 0.01;
+    let start = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    let bounds = link.pieces.iter().map(|piece| piece.bounds(&Pose::IDENTITY));
+    let (low, high) = bounds.fold(start, |a, b| (a.0.min(b.0), a.1.max(b.1)));
+    let middle = if low.is_finite() { vector(0.5 * (low + high)) } else { Vector::ZERO };
+    MassProperties::new(middle, MASS_KG, Vector::splat(0.4 * MASS_KG * 0.05 * 0.05))
 }
 
-#[derive(Clone, Copy)]
-enum Weight {
-    Density(f64),
-    Mass(f64),
-}
-
-fn insert_solids(
-    world: &mut PhysicsWorld,
-    solids: &[BuiltSolid],
-    body: RigidBodyHandle,
-    placed: &Placed,
-    weight: Weight,
-) -> Vec<ColliderHandle> {
-    let insert = |built: &BuiltSolid| {
-        let (turn, shape) = shape(&built.placed.solid, built.bevel_m);
-        let collider = ColliderBuilder::new(shape)
-            .position(to_engine(&(built.placed.pose * turn)))
-            .friction(placed.friction as f32);
-        let collider = match weight {
+fn insert_pieces(world: &mut PhysicsWorld, link: &Link, body: RigidBodyHandle) -> Vec<ColliderHandle> {
+    let volume = link.volume();
+    let insert = |piece: &Piece| {
+        let (turn, shape) = piece.shape.collision(piece.bevel_m)?;
+        let collider =
+            ColliderBuilder::new(shape).position(to_engine(&(piece.pose * turn))).friction(link.friction as f32);
+        let collider = match link.weight {
             Weight::Density(density) => collider.density(density as f32),
-            Weight::Mass(mass) => collider.mass(mass as f32),
+            Weight::Mass(mass) => collider.mass((mass * piece.shape.volume() / volume) as f32),
         };
-        world.insert_collider(collider, Some(body))
+        Some(world.insert_collider(collider, Some(body)))
     };
-    solids.iter().map(insert).collect()
-}
-
-/// The true state of all objects.
-pub(crate) fn true_objects(world: &World) -> Vec<TrueObject> {
-    let object = |body: &Body| TrueObject {
-        name: body.placed.name.clone(),
-        model: body.placed.model.clone(),
-        pose: body.pose(&world.physics),
-        size_m: body.placed.size(),
-        color: body.placed.solids.first().map_or([0; 3], |solid| solid.color),
-        held: world.contacts.pads_touching(&body.colliders) == 2,
-    };
-    world.bodies.iter().map(object).collect()
+    link.pieces.iter().filter(|piece| piece.solid).filter_map(insert).collect()
 }

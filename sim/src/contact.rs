@@ -1,14 +1,17 @@
 //! What touches the pads, and with which force.
 
-use crate::{gripper::Gripper, profile::SUBSTEPS};
+use crate::{
+    profile::SUBSTEPS,
+    robot::{Robot, Touching},
+};
 use glam::DVec3;
 use rapier3d::prelude::{ColliderHandle, ContactPair, PhysicsWorld};
 use serde::{Deserialize, Serialize};
 
-/// Contacts of the two pads after one physics step.
+/// Contacts of every hand's two pads after one physics step. A suction cup counts as two pads on what it holds.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(crate) struct Contacts {
-    pads: [PadContacts; 2],
+    hands: Vec<[PadContacts; 2]>,
 }
 
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
@@ -19,28 +22,43 @@ struct PadContacts {
 }
 
 impl Contacts {
-    pub(crate) fn read(&mut self, world: &PhysicsWorld, gripper: &Gripper) {
+    pub(crate) fn read(&mut self, world: &PhysicsWorld, robot: &Robot) {
         let dt = f64::from(world.integration_parameters.dt);
-        for (pad, collider) in self.pads.iter_mut().zip(gripper.pads) {
-            pad.partners.clear();
-            pad.force = DVec3::ZERO;
-            for pair in world.contact_pairs_with(collider) {
-                let impulse = impulse_on(pair, collider);
-                if pair.total_impulse_magnitude() > 0.0 {
-                    pad.force += impulse / dt;
-                    pad.partners.push(if pair.collider1 == collider { pair.collider2 } else { pair.collider1 });
+        self.hands.resize_with(robot.description.arms(), Default::default);
+        for (pads, touching) in self.hands.iter_mut().zip(robot.touching()) {
+            match touching {
+                Touching::Pads(colliders) => read_pads(pads, colliders, world, dt),
+                Touching::Cup(held) => {
+                    for pad in pads {
+                        *pad = PadContacts { partners: held.into_iter().collect(), force: DVec3::ZERO };
+                    }
                 }
             }
         }
     }
-    /// How many pads touch one of these colliders.
+    /// How many pads of one hand touch one of these colliders; the hand that has the most.
     pub(crate) fn pads_touching(&self, colliders: &[ColliderHandle]) -> usize {
         let touches = |pad: &&PadContacts| pad.partners.iter().any(|partner| colliders.contains(partner));
-        self.pads.iter().filter(touches).count()
+        self.hands.iter().map(|pads| pads.iter().filter(touches).count()).max().unwrap_or(0)
     }
-    /// How many pads touch anything.
+    /// How many pads of one hand touch anything; the hand that has the most.
     pub(crate) fn pads_in_contact(&self) -> usize {
-        self.pads.iter().filter(|pad| !pad.partners.is_empty()).count()
+        let touches = |pad: &&PadContacts| !pad.partners.is_empty();
+        self.hands.iter().map(|pads| pads.iter().filter(touches).count()).max().unwrap_or(0)
+    }
+}
+
+fn read_pads(pads: &mut [PadContacts; 2], colliders: [ColliderHandle; 2], world: &PhysicsWorld, dt: f64) {
+    for (pad, collider) in pads.iter_mut().zip(colliders) {
+        pad.partners.clear();
+        pad.force = DVec3::ZERO;
+        for pair in world.contact_pairs_with(collider) {
+            let impulse = impulse_on(pair, collider);
+            if pair.total_impulse_magnitude() > 0.0 {
+                pad.force += impulse / dt;
+                pad.partners.push(if pair.collider1 == collider { pair.collider2 } else { pair.collider1 });
+            }
+        }
     }
 }
 
@@ -67,8 +85,9 @@ pub(crate) struct TickForces {
 }
 
 impl TickForces {
-    pub(crate) fn add(&mut self, contacts: &Contacts, wrist: DVec3) {
-        for (sum, pad) in self.pads.iter_mut().zip(&contacts.pads) {
+    /// Takes what the pads of one hand and its wrist feel.
+    pub(crate) fn add(&mut self, contacts: &Contacts, hand: usize, wrist: DVec3) {
+        for (sum, pad) in self.pads.iter_mut().zip(contacts.hands.get(hand).into_iter().flatten()) {
             *sum += pad.force;
         }
         self.wrist += wrist;

@@ -3,17 +3,20 @@
 use crate::{
     audit::AuditReport,
     body::Body,
+    model::info,
     oracle::OracleVerdict,
-    report::{Preview, SimError, SimOptions, SimTimings, TrueObject},
+    report::{Preview, SimError, SimOptions, SimTimings},
     scenario::{Scenario, TaskTemplate},
     scene::{Ids, Stage, fnv, state_hash},
     snapshot::{self, SavedRng, Snapshot, SnapshotError, Whole, WorldState},
+    truth::TrueObject,
     world::{World, cpu_s},
 };
 use acm_concept::{
     camera::{CameraError, CameraModel, CameraSource, FrameHeader, Intrinsics, MAX_PIXELS, RgbdFrame},
     embodiment::{Clock, Command, Embodiment, EmbodimentError, Feedback, RobotDescription},
     ids::FrameId,
+    plane::Plane,
     task::TaskSpec,
     time::Time,
 };
@@ -37,7 +40,7 @@ pub type SharedRenderer = Arc<Mutex<Renderer>>;
 /// let simulation = Simulation::without_renderer(&scenario, &SimOptions::default())?;
 /// let mut robot = simulation.embodiment();
 /// let here = robot.feedback();
-/// let command = acm_concept::embodiment::Command { tcp: here.tcp, opening_m: 0.08, grip_force_n: 20.0 };
+/// let command = acm_concept::embodiment::Command::hand(here.tcp, 0.08, 20.0);
 /// assert!((robot.command(&command)?.time.seconds() - 0.02).abs() < 1e-9);
 /// assert!(!simulation.verdict().strict);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -77,14 +80,14 @@ impl Simulation {
     pub fn without_renderer(scenario: &Scenario, options: &SimOptions) -> Result<Simulation, SimError> {
         let world = World::new(scenario, options)?;
         let cameras = cameras(scenario, options)?;
-        let stage = Stage::new(&world, &scenario.world.lighting)?;
+        let stage = Stage::new(&world)?;
         Ok(Simulation {
             shared: Arc::new(Mutex::new(world)),
             task: scenario.task.clone(),
+            eyes: Mutex::new(Arc::new(Mutex::new(Eyes::new(options.seed, cameras.len())))),
             cameras,
             stage: Arc::new(stage),
             renderer: None,
-            eyes: Mutex::new(Arc::new(Mutex::new(Eyes::new(options.seed)))),
             seed: options.seed,
         })
     }
@@ -95,19 +98,20 @@ impl Simulation {
             instruction: self.task.instruction.clone(),
             instruction_at_s: self.task.instruction_at_s,
             budgets: self.task.budgets,
+            then: self.task.then.clone(),
             cameras: self.cameras.iter().map(|camera| camera.nominal.clone()).collect(),
         }
     }
 
     /// The robot.
     pub fn embodiment(&self) -> Box<dyn Embodiment> {
-        let robot = self.world().robot.clone();
+        let robot = self.world().robot.description.clone();
         Box::new(Robot { shared: self.shared.clone(), robot })
     }
 
     /// The cameras. Frames are numbered from 0 by each source.
     pub fn camera(&self) -> Box<dyn CameraSource> {
-        let eyes = Arc::new(Mutex::new(Eyes::new(self.seed)));
+        let eyes = Arc::new(Mutex::new(Eyes::new(self.seed, self.cameras.len())));
         *lock(&self.eyes) = eyes.clone();
         Box::new(Cameras {
             shared: self.shared.clone(),
@@ -141,8 +145,11 @@ impl Simulation {
         let rounded = |v: glam::DVec3| (v * 1e4).round().as_i64vec3();
         let line = |body: &Body| {
             let yaw = (body.start.yaw() * 1e2).round() as i64;
-            let color = body.placed.solids.first().map(|solid| solid.color);
-            format!("{} {yaw} {} {color:?}", rounded(body.start.translation), rounded(body.placed.size()))
+            let color = body.placed.color();
+            let joints: Vec<i64> =
+                body.joints.iter().map(|(_, joint)| (joint.joint.start * 1e3).round() as i64).collect();
+            let (at, size) = (rounded(body.start.translation), rounded(body.placed.size()));
+            format!("{at} {yaw} {size} {color:?} {joints:?}")
         };
         let mut lines: Vec<String> = world.bodies.iter().map(line).collect();
         lines.sort();
@@ -152,6 +159,22 @@ impl Simulation {
     /// The objects as they truly are now. For analysing failures; never for the agent.
     pub fn truth(&self) -> Vec<TrueObject> {
         self.world().truth()
+    }
+
+    /// What each object is made of, for people: its name, and lines about its links and joints.
+    pub fn inventory(&self) -> Vec<(String, Vec<String>)> {
+        let world = self.world();
+        let of = |body: &Body| {
+            let lines = info::lines(&world.models[body.placed.spec], &body.placed.links, &body.joints);
+            (body.placed.name.clone(), lines)
+        };
+        world.bodies.iter().map(of).collect()
+    }
+
+    /// The judge's variables as they are now, by name. For analysing failures; never for the agent.
+    pub fn variables(&self) -> Vec<(String, f64)> {
+        let world = self.world();
+        world.variables.iter().cloned().zip(world.state.iter().copied()).collect()
     }
 
     /// Processor time taken so far.
@@ -172,8 +195,7 @@ impl Simulation {
         let world_digest = self.world_digest();
         let world = WorldState::of(&self.world())?;
         let eyes = lock(&self.eyes).clone();
-        let eyes = lock(&eyes);
-        let eyes = snapshot::Eyes { noise: SavedRng::of(&eyes.noise), next: eyes.next };
+        let eyes = lock(&eyes).save();
         Snapshot::pack(&Whole { world_digest, world, eyes })
     }
 
@@ -189,7 +211,7 @@ impl Simulation {
         }
         whole.world.put_into(&mut self.world());
         let eyes = lock(&self.eyes).clone();
-        *lock(&eyes) = Eyes { noise: whole.eyes.noise.rng(), next: whole.eyes.next };
+        *lock(&eyes) = Eyes::restore(whole.eyes);
         Ok(())
     }
 
@@ -205,10 +227,12 @@ impl Simulation {
     pub fn preview(&self, camera: Option<&str>) -> Result<Preview, SimError> {
         let renderer = self.renderer.as_ref().ok_or(SimError::NoRenderer)?;
         let world = self.world();
-        let found = self.cameras.iter().find(|c| camera.is_none_or(|name| c.nominal.name == name));
-        let camera = found.ok_or_else(|| SimError::NoCamera { name: camera.unwrap_or_default().into() })?;
+        let mut cameras = self.cameras.iter().enumerate();
+        let found = cameras.find(|(_, c)| camera.is_none_or(|name| c.nominal.name == name));
+        let (at, camera) = found.ok_or_else(|| SimError::NoCamera { name: camera.unwrap_or_default().into() })?;
         let mut renderer = lock(renderer);
-        let rendered = renderer.render(&self.stage.scene(&world), &camera.nominal)?;
+        let mut rendered = renderer.render(&self.stage.scene(&world), &world.placed(&camera.nominal))?;
+        expose(&mut rendered.color, world.exposures.get(at).copied().unwrap_or(1.0));
         let color = image::RgbImage::from_raw(rendered.width, rendered.height, rendered.color).unwrap_or_default();
         Ok(Preview { color, ids: rendered.ids, legend: Ids::of(&world).legend(&world) })
     }
@@ -293,16 +317,35 @@ struct Cameras {
 /// What a camera source changes from frame to frame.
 struct Eyes {
     noise: ChaCha8Rng,
+    /// What each camera showed last.
+    shown: Vec<Option<Picture>>,
     /// Number of the next frame.
     next: u64,
 }
 
 impl Eyes {
-    fn new(seed: u64) -> Eyes {
+    fn new(seed: u64, cameras: usize) -> Eyes {
         let mut noise = ChaCha8Rng::seed_from_u64(seed);
         noise.set_stream(STREAM_NOISE);
-        Eyes { noise, next: 0 }
+        Eyes { noise, shown: vec![None; cameras], next: 0 }
     }
+    fn save(&self) -> snapshot::Eyes {
+        let planes = |picture: &Picture| (picture.color.to_vec(), picture.depth.to_vec());
+        let shown = self.shown.iter().map(|shown| shown.as_ref().map(planes)).collect();
+        snapshot::Eyes { noise: SavedRng::of(&self.noise), next: self.next, shown }
+    }
+    fn restore(saved: snapshot::Eyes) -> Eyes {
+        let picture = |(color, depth): (Vec<u8>, Vec<f32>)| Picture { color: color.into(), depth: depth.into() };
+        let shown = saved.shown.into_iter().map(|shown| shown.map(picture)).collect();
+        Eyes { noise: saved.noise.rng(), shown, next: saved.next }
+    }
+}
+
+/// Colour and depth of a frame.
+#[derive(Clone)]
+struct Picture {
+    color: Plane<u8>,
+    depth: Plane<f32>,
 }
 
 impl CameraSource for Cameras {
@@ -319,28 +362,48 @@ impl CameraSource for Cameras {
         let renderer = self.renderer.as_ref().ok_or_else(|| failed("the simulation has no renderer".into()))?;
         let (mut world, mut eyes) = (lock(&self.shared), lock(&self.eyes));
         let pixels = found.nominal.intrinsics.pixels();
-        let (color, depth) = if world.is_covered(at) {
-            (vec![0; 3 * pixels], vec![0.0; pixels])
+        let stuck = if world.is_frozen(at) { eyes.shown.get(at).cloned().flatten() } else { None };
+        let picture = if let Some(stuck) = stuck {
+            stuck
+        } else if world.is_covered(at) {
+            Picture { color: vec![0; 3 * pixels].into(), depth: vec![0.0; pixels].into() }
         } else {
             let started = cpu_s(ClockId::ProcessCPUTime);
             let scene = self.stage.scene(&world);
-            let truth = found.sensor.true_camera(&found.nominal);
-            let rendered = lock(renderer).render(&scene, &truth).map_err(|e| failed(e.to_string()))?;
+            let truth = world.placed(&found.sensor.true_camera(&found.nominal));
+            let mut rendered = lock(renderer).render(&scene, &truth).map_err(|e| failed(e.to_string()))?;
             world.timings.render_s += cpu_s(ClockId::ProcessCPUTime) - started;
             let started = cpu_s(ClockId::ThreadCPUTime);
+            expose(&mut rendered.color, world.exposures.get(at).copied().unwrap_or(1.0));
             let measured = found.sensor.measure(&rendered, &truth, &mut eyes.noise);
             world.timings.noise_s += cpu_s(ClockId::ThreadCPUTime) - started;
-            (measured.color, measured.depth)
+            Picture { color: measured.color.into(), depth: measured.depth.into() }
         };
         let header = FrameHeader {
             id: FrameId(eyes.next),
             camera: camera.into(),
             time: world.now(),
             intrinsics: found.nominal.intrinsics,
-            camera_pose: found.nominal.pose,
+            camera_pose: world.placed(&found.nominal).pose,
         };
         eyes.next += 1;
-        RgbdFrame::new(header, color.into(), depth.into()).map_err(|e| failed(e.to_string()))
+        if let Some(shown) = eyes.shown.get_mut(at) {
+            *shown = Some(picture.clone());
+        }
+        RgbdFrame::new(header, picture.color, picture.depth).map_err(|e| failed(e.to_string()))
+    }
+}
+
+/// Brightens or darkens 8-bit sRGB colours as a longer or shorter exposure would.
+fn expose(color: &mut [u8], exposure: f64) {
+    if exposure == 1.0 {
+        return;
+    }
+    // sRGB is near enough to a power of 2.2 of the light.
+    let gain = exposure.powf(1.0 / 2.2);
+    let table: [u8; 256] = std::array::from_fn(|value| (value as f64 * gain).round().min(255.0) as u8);
+    for value in color {
+        *value = table[usize::from(*value)];
     }
 }
 

@@ -1,9 +1,9 @@
-//! What third parties do: they carry objects from place to place, whether a camera sees it or not, and stand before
-//! cameras.
+//! What third parties do: they carry objects from place to place, whether a camera sees it or not, stand before
+//! cameras, and stop them.
 
 use crate::{
     body::Body,
-    convert::to_engine,
+    convert::{from_engine, to_engine},
     layout::{Layout, LayoutError, number, vector},
     oracle::Watch,
     scenario::{DeedSpec, EventSpec, WorldSpec},
@@ -27,6 +27,7 @@ pub(crate) struct Event {
 enum Deed {
     Carry { body: usize, to: Pose, lift_m: f64 },
     Cover { cameras: Vec<usize> },
+    Freeze { cameras: Vec<usize> },
 }
 
 /// How far an event has come: all that it changes while the world runs.
@@ -53,6 +54,7 @@ pub(crate) fn build(spec: &WorldSpec, layout: &Layout, variables: &[String]) -> 
                 Deed::Carry { body, to, lift_m: *lift_m }
             }
             DeedSpec::Cover { cameras } => Deed::Cover { cameras: cameras.clone() },
+            DeedSpec::Freeze { cameras } => Deed::Freeze { cameras: cameras.clone() },
         };
         let when = event.when.as_ref().map(|when| Watch::new(when, variables));
         Ok(Event { when, after_s: event.after_s, over_s: event.over_s, deed, phase: Phase::Waiting })
@@ -81,6 +83,11 @@ impl Event {
     pub(crate) fn covers(&self, camera: usize) -> bool {
         let covered = matches!(&self.deed, Deed::Cover { cameras } if cameras.contains(&camera));
         covered && matches!(self.phase, Phase::Acting(..))
+    }
+    /// Whether a camera is stuck at its last picture now.
+    pub(crate) fn freezes(&self, camera: usize) -> bool {
+        let frozen = matches!(&self.deed, Deed::Freeze { cameras } if cameras.contains(&camera));
+        frozen && matches!(self.phase, Phase::Acting(..))
     }
 }
 
@@ -128,11 +135,15 @@ fn carry(world: &mut PhysicsWorld, body: &Body, pose: &Pose) {
     }
 }
 
-/// Sets an object down at rest.
+/// Sets an object down at rest, its parts as they are to each other.
 pub(crate) fn put(world: &mut PhysicsWorld, body: &Body, pose: &Pose) {
-    if let Some(body) = world.bodies.get_mut(body.handle) {
-        body.set_position(to_engine(pose), true);
-        body.set_linvel(Default::default(), true);
-        body.set_angvel(Default::default(), true);
+    let shift = *pose * body.pose(world).inverse();
+    for handle in body.handles() {
+        if let Some(part) = world.bodies.get_mut(handle) {
+            let moved = if handle == body.handle { *pose } else { shift * from_engine(part.position()) };
+            part.set_position(to_engine(&moved), true);
+            part.set_linvel(Default::default(), true);
+            part.set_angvel(Default::default(), true);
+        }
     }
 }

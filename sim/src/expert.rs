@@ -52,7 +52,7 @@ impl Expert {
     }
     fn tick(&mut self, tcp: Pose) -> Feedback {
         self.tcp = tcp;
-        self.robot.command(&Command { tcp, opening_m: self.opening_m, grip_force_n: GRIP_N }).unwrap()
+        self.robot.command(&Command::hand(tcp, self.opening_m, GRIP_N)).unwrap()
     }
     pub(crate) fn wait(&mut self, seconds: f64) -> Feedback {
         for _ in 0..(seconds / 0.02) as u32 {

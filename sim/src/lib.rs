@@ -6,17 +6,20 @@
 //! | module | holds |
 //! |---|---|
 //! | `scenario`, `model` | scenario files and object models: raw text to checked meaning |
-//! | `random`, `layout` | seeded draws, start layouts, rejection |
-//! | `world`, `body`, `gripper`, `contact` | the running physics: objects, mechanisms, the hand, what it feels |
-//! | `event`, `slip` | what third parties do, and an injected mishap |
+//! | `random`, `layout`, `placed` | seeded draws, start layouts, rejection, how one copy is made |
+//! | `world`, `body`, `articulation`, `contact` | the running physics: objects, their joints, what the pads touch |
+//! | `robot` | robots as data: arms, wrists, hands, their limits and what they feel |
+//! | `event`, `mishap` | what third parties do, and mishaps with what is carried |
+//! | `fluent` | regions, named quantities and the rules that change them |
 //! | `oracle`, `state` | the judge and its variables |
 //! | `audit` | whether whatever happened had a cause |
 //! | `snapshot` | all of it as bytes, and back |
-//! | `episode`, `scene`, `report` | the handles, the picture, what is reported |
+//! | `episode`, `scene`, `truth`, `report` | the handles, the picture, the truth, what is reported |
 //!
 //! Conventions: metres, seconds, newtons; world frame with z up; an object's base frame is the middle of its bottom.
 //! The world advances only when the robot is commanded or the clock waits.
 
+mod articulation;
 mod audit;
 mod body;
 mod contact;
@@ -25,26 +28,36 @@ mod episode;
 mod event;
 #[cfg(test)]
 mod expert;
-mod gripper;
+mod fluent;
 mod layout;
+mod mishap;
 mod model;
 mod oracle;
+mod placed;
 mod profile;
 mod random;
 mod report;
+mod robot;
 mod scenario;
 mod scene;
-mod slip;
+#[cfg(test)]
+mod shared_data;
 mod snapshot;
 mod state;
+#[cfg(test)]
+mod testbed;
+mod truth;
 mod world;
 
 pub use audit::AuditReport;
 pub use episode::{SharedRenderer, Simulation};
 pub use layout::LayoutError;
+pub use mishap::MishapKind;
 pub use oracle::OracleVerdict;
 pub use profile::PhysicsProfile;
 pub use random::DrawError;
-pub use report::{Preview, SimError, SimOptions, SimTimings, TrueObject};
-pub use scenario::{MAX_SCENARIO_BYTES, Scenario, ScenarioError};
+pub use report::{Preview, SimError, SimOptions, SimTimings};
+pub use robot::RobotError;
+pub use scenario::{MAX_SCENARIO_BYTES, Scenario, ScenarioError, Setting};
 pub use snapshot::{Snapshot, SnapshotError};
+pub use truth::{TrueJoint, TrueLink, TrueObject, TruePiece, TrueShape};

@@ -1,11 +1,12 @@
 //! The judge: predicates over the world's true state, evaluated after every physics step.
 
-use crate::scenario::{JudgeSpec, PredicateSpec};
+use crate::{
+    model::{ObjectModel, variables},
+    scenario::{JudgeSpec, PredicateSpec},
+};
 use acm_concept::expression::Expression;
 use serde::{Deserialize, Serialize};
 
-const OBJECT_VARIABLES: [&str; 9] = ["x", "y", "z", "speed", "spin", "tilt", "moved", "turned", "touched"];
-const BUTTON_VARIABLES: [&str; 3] = ["pressed", "presses", "depth"];
 const WORLD_VARIABLES: [&str; 7] =
     ["others_moved", "commanded_opening", "pad_contact", "tcp_x", "tcp_y", "tcp_z", "time"];
 
@@ -24,17 +25,17 @@ pub struct OracleVerdict {
     pub explanation: String,
 }
 
-/// Names of all variables of the judge: of objects (the name if it has no copies, and whether it has a button), of
-/// the world, and of constants.
-pub(crate) fn names<'a>(objects: impl Iterator<Item = (Option<&'a str>, bool)>, others: &[String]) -> Vec<String> {
+/// Names of all variables of the judge: of objects (the name if it has no copies, and its model), of the world, and of
+/// constants.
+pub(crate) fn names<'a>(
+    objects: impl Iterator<Item = (Option<&'a str>, &'a ObjectModel)>,
+    others: &[String],
+) -> Vec<String> {
     let mut names: Vec<String> = WORLD_VARIABLES.iter().map(|name| name.to_string()).collect();
     names.extend(others.iter().cloned());
-    for (name, button) in objects {
+    for (name, model) in objects {
         let Some(name) = name else { continue };
-        names.extend(OBJECT_VARIABLES.iter().map(|variable| format!("{name}_{variable}")));
-        if button {
-            names.extend(BUTTON_VARIABLES.iter().map(|variable| format!("{name}_{variable}")));
-        }
+        names.extend(variables::own(model).iter().map(|variable| format!("{name}_{variable}")));
     }
     names
 }
@@ -51,11 +52,26 @@ impl Watch {
         let slot = |name: &str| Some((name.to_string(), names.iter().position(|known| known == name)?));
         Watch { expression: expression.clone(), slots: expression.names().into_iter().filter_map(slot).collect() }
     }
+    /// An expression over an object's own variables, which are named here without the object's name.
+    pub(crate) fn of_object(text: &str, object: &str, model: &ObjectModel, names: &[String]) -> Option<Watch> {
+        let own = variables::own(model);
+        let expression = Expression::parse(text, &own.iter().map(String::as_str).collect::<Vec<_>>()).ok()?;
+        let slot = |name: &str| {
+            let full = format!("{object}_{name}");
+            Some((name.to_string(), names.iter().position(|known| *known == full)?))
+        };
+        let slots = expression.names().into_iter().filter_map(slot).collect();
+        Some(Watch { expression, slots })
+    }
     /// Whether it holds. The parser has checked the names, so a failed evaluation is a number out of its domain,
     /// and does not hold.
     pub(crate) fn holds(&self, state: &[f64]) -> bool {
+        self.value(state).is_some_and(|value| value != 0.0)
+    }
+    /// Its value, if it is a finite number.
+    pub(crate) fn value(&self, state: &[f64]) -> Option<f64> {
         let values: Vec<(&str, f64)> = self.values(state).collect();
-        self.expression.evaluate(&values).is_ok_and(|value| value != 0.0)
+        self.expression.evaluate(&values).ok().filter(|value| value.is_finite())
     }
     fn values<'a>(&'a self, state: &'a [f64]) -> impl Iterator<Item = (&'a str, f64)> {
         self.slots.iter().map(|(name, slot)| (name.as_str(), state.get(*slot).copied().unwrap_or(f64::NAN)))

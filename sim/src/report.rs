@@ -1,9 +1,7 @@
 //! What goes into a simulation and what is read off it.
 
 use crate::{layout::LayoutError, scenario::ScenarioError};
-use acm_concept::pose::Pose;
 use acm_render::{MeshError, RenderError, sensor::UnknownProfile};
-use glam::DVec3;
 use serde::Serialize;
 use thiserror::Error;
 
@@ -14,6 +12,8 @@ pub struct SimOptions {
     pub seed: u64,
     /// During this carry, counted from 1, the object is taken out of the hand unseen and set down 5-12 cm away.
     pub slip_at: Option<u32>,
+    /// During this carry, counted from 1, the fingers open for a moment and the object falls.
+    pub drop_at: Option<u32>,
     /// Sensor profile of all cameras instead of the scenario's.
     pub sensor: Option<String>,
     /// Whether the robot may move.
@@ -24,7 +24,7 @@ pub struct SimOptions {
 
 impl Default for SimOptions {
     fn default() -> Self {
-        SimOptions { seed: 0, slip_at: None, sensor: None, motion: true, camera_size: None }
+        SimOptions { seed: 0, slip_at: None, drop_at: None, sensor: None, motion: true, camera_size: None }
     }
 }
 
@@ -37,23 +37,6 @@ pub struct SimTimings {
     pub render_s: f64,
     /// Sensor model: of the calling thread.
     pub noise_s: f64,
-}
-
-/// An object as it truly is. For analysing failures and for drawing; never for the agent.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct TrueObject {
-    /// Name in the scenario, with `_0`, `_1`, ... for copies.
-    pub name: String,
-    /// Its model.
-    pub model: String,
-    /// Pose of its base frame (the middle of its bottom) in the world.
-    pub pose: Pose,
-    /// Extents along the axes of its base frame, metres.
-    pub size_m: DVec3,
-    /// Colour of its first solid, 8-bit sRGB.
-    pub color: [u8; 3],
-    /// Whether both pads touch it.
-    pub held: bool,
 }
 
 /// The start of an episode as its main camera would see it without any error.

@@ -1,8 +1,12 @@
 //! The world as a scene for the renderer.
 
-use crate::{convert::from_engine, layout::BuiltSolid, world::World};
+use crate::{
+    convert::from_engine,
+    model::{Piece, shape::Shape},
+    world::World,
+};
 use acm_concept::{pose::Pose, solid::Solid};
-use acm_render::{Instance, Lighting, Material, Mesh, MeshError, Scene};
+use acm_render::{Instance, Material, Mesh, MeshError, Scene};
 use glam::{DVec3, Vec3};
 use std::sync::Arc;
 
@@ -10,33 +14,33 @@ const BACKGROUND: [u8; 3] = [200, 200, 205];
 const HAND_COLOR: [u8; 3] = [235, 235, 235];
 const FINGER_COLOR: [u8; 3] = [60, 60, 66];
 
-/// Meshes and constant parts of a world's scene.
+/// Meshes of a world's scene.
 #[derive(Debug)]
 pub(crate) struct Stage {
-    lighting: Lighting,
     cuboid: Arc<Mesh>,
     cylinder: Arc<Mesh>,
-    /// A bevelled box has its own mesh, because scaling would distort the bevel: object, solid, mesh.
-    bevelled: Vec<(usize, usize, Arc<Mesh>)>,
+    ball: Arc<Mesh>,
+    /// A bevelled box has its own mesh, because scaling would distort the bevel: object, link, piece, mesh.
+    bevelled: Vec<([usize; 3], Arc<Mesh>)>,
 }
 
 impl Stage {
-    pub(crate) fn new(world: &World, lighting: &Lighting) -> Result<Stage, MeshError> {
+    pub(crate) fn new(world: &World) -> Result<Stage, MeshError> {
         let mut bevelled = Vec::new();
         for (object, body) in world.bodies.iter().enumerate() {
-            for (index, built) in body.placed.solids.iter().enumerate() {
-                if let (Solid::Box { size }, true) = (built.placed.solid, built.bevel_m > 0.0) {
-                    bevelled.push((object, index, Arc::new(bevelled_box(size, built.bevel_m)?)));
+            for (link, piece, at) in pieces(body.placed.links.iter().map(|link| &link.pieces)) {
+                if let (Shape::Solid(Solid::Box { size }), true) = (&at.shape, at.bevel_m > 0.0) {
+                    bevelled.push(([object, link, piece], Arc::new(bevelled_box(*size, at.bevel_m)?)));
                 }
             }
         }
         let (cuboid, cylinder) = (Arc::new(Mesh::unit_box()), Arc::new(Mesh::unit_cylinder()));
-        Ok(Stage { lighting: lighting.clone(), cuboid, cylinder, bevelled })
+        Ok(Stage { cuboid, cylinder, ball: Arc::new(unit_ball()?), bevelled })
     }
 
     /// The scene as the world stands now.
     pub(crate) fn scene(&self, world: &World) -> Scene {
-        let mut scene = Scene { instances: Vec::new(), lights: self.lighting.clone(), background: BACKGROUND };
+        let mut scene = Scene { instances: Vec::new(), lights: world.lighting.clone(), background: BACKGROUND };
         let ids = Ids::of(world);
         for (index, (_, surface)) in world.surfaces.iter().enumerate() {
             let solid = Solid::Box { size: surface.size };
@@ -44,41 +48,47 @@ impl Stage {
             scene.instances.push(self.instance(&solid, pose, surface.color.0, ids.surface(index)));
         }
         for (index, body) in world.bodies.iter().enumerate() {
-            let pose = body.pose(&world.physics);
-            for (place, built) in body.placed.solids.iter().enumerate() {
-                scene.instances.push(self.built(index, place, built, pose, ids.object(index)));
-            }
-            let cap = body.cap_pose(&world.physics).unwrap_or(pose);
-            for built in &body.placed.cap {
-                let pose = cap * built.placed.pose;
-                scene.instances.push(self.instance(&built.placed.solid, pose, built.color, ids.object(index)));
+            let poses: Vec<Pose> =
+                (0..body.placed.links.len()).map(|link| body.link_pose(&world.physics, link)).collect();
+            for (link, place, piece) in pieces(body.placed.links.iter().map(|link| &link.pieces)) {
+                if piece.shown {
+                    let color = body.color(piece, &world.state);
+                    self.add_piece(&mut scene, [index, link, place], piece, poses[link], color, ids.object(index));
+                }
             }
         }
-        self.add_hand(world, &mut scene, ids.hand());
+        self.add_robot(world, &mut scene, ids.hand());
         scene
     }
 
-    fn add_hand(&self, world: &World, scene: &mut Scene, id: u32) {
-        let tcp = world.gripper.tcp(&world.physics);
-        for part in &world.robot.hand {
-            scene.instances.push(self.instance(&part.solid, tcp * part.pose, HAND_COLOR, id));
-        }
-        let mirror = Pose::from_yaw(DVec3::ZERO, std::f64::consts::PI);
-        for (frame, turn) in world.gripper.finger_poses(&world.physics).into_iter().zip([Pose::IDENTITY, mirror]) {
-            for part in &world.robot.finger {
-                scene.instances.push(self.instance(&part.solid, frame * turn * part.pose, FINGER_COLOR, id));
-            }
+    fn add_robot(&self, world: &World, scene: &mut Scene, id: u32) {
+        for (part, is_finger) in world.robot.seen(&world.physics) {
+            let color = if is_finger { FINGER_COLOR } else { HAND_COLOR };
+            scene.instances.push(self.instance(&part.solid, part.pose, color, id));
         }
     }
 
-    fn built(&self, object: usize, place: usize, built: &BuiltSolid, body: Pose, id: u32) -> Instance {
-        let pose = body * built.placed.pose;
-        match self.bevelled.iter().find(|(o, p, _)| (*o, *p) == (object, place)) {
-            Some((_, _, mesh)) => {
-                let material = Material::plain(built.color);
-                Instance { mesh: mesh.clone(), pose, scale: DVec3::ONE, material, id }
+    fn add_piece(&self, scene: &mut Scene, at: [usize; 3], piece: &Piece, link: Pose, color: [u8; 3], id: u32) {
+        let pose = link * piece.pose;
+        let material = Material::plain(color);
+        let mut add = |mesh: &Arc<Mesh>, pose: Pose, scale: DVec3| {
+            scene.instances.push(Instance { mesh: mesh.clone(), pose, scale, material, id });
+        };
+        match &piece.shape {
+            Shape::Solid(solid) => match self.bevelled.iter().find(|(known, _)| *known == at) {
+                Some((_, mesh)) => add(mesh, pose, DVec3::ONE),
+                None => scene.instances.push(self.instance(solid, pose, color, id)),
+            },
+            Shape::Capsule { radius, height } => {
+                add(&self.cylinder, pose, DVec3::new(*radius, *radius, *height));
+                for end in [-0.5, 0.5] {
+                    add(&self.ball, pose * Pose::from_translation(DVec3::Z * (end * height)), DVec3::splat(*radius));
+                }
             }
-            None => self.instance(&built.placed.solid, pose, built.color, id),
+            Shape::Ball { radius } => add(&self.ball, pose, DVec3::splat(*radius)),
+            Shape::Surface { mesh, scale } => add(mesh, pose, *scale),
+            // What is felt alone has no surface to draw.
+            Shape::Hull(_) => {}
         }
     }
 
@@ -89,6 +99,11 @@ impl Stage {
         };
         Instance { mesh: mesh.clone(), pose, scale, material: Material::plain(color), id }
     }
+}
+
+/// All pieces of some links: link, place within it, piece.
+fn pieces<'a>(links: impl Iterator<Item = &'a Vec<Piece>>) -> impl Iterator<Item = (usize, usize, &'a Piece)> {
+    links.enumerate().flat_map(|(link, pieces)| pieces.iter().enumerate().map(move |(at, piece)| (link, at, piece)))
 }
 
 /// Numbers of what can be seen: surfaces first, then objects, then the hand.
@@ -151,6 +166,35 @@ fn bevelled_box(size: DVec3, bevel: f64) -> Result<Mesh, MeshError> {
     Mesh::from_triangles("bevelled box", &positions, &triangles)
 }
 
+const BALL_RINGS: u32 = 16;
+const BALL_SEGMENTS: u32 = 32;
+
+/// A ball of radius 1 about the origin.
+fn unit_ball() -> Result<Mesh, MeshError> {
+    let point = |ring: u32, step: u32| {
+        let (across, up) = (ring as f32 / BALL_RINGS as f32 * std::f32::consts::PI).sin_cos();
+        let (sine, cosine) = (step as f32 / BALL_SEGMENTS as f32 * std::f32::consts::TAU).sin_cos();
+        Vec3::new(across * cosine, across * sine, up)
+    };
+    let mut positions = vec![Vec3::Z, Vec3::NEG_Z];
+    positions.extend((1..BALL_RINGS).flat_map(|ring| (0..BALL_SEGMENTS).map(move |step| point(ring, step))));
+    let at = |ring: u32, step: u32| match ring {
+        0 => 0,
+        BALL_RINGS => 1,
+        ring => 2 + (ring - 1) * BALL_SEGMENTS + step % BALL_SEGMENTS,
+    };
+    let mut triangles = Vec::new();
+    for ring in 0..BALL_RINGS {
+        for step in 0..BALL_SEGMENTS {
+            let [a, b] = [at(ring, step), at(ring, step + 1)];
+            let [c, d] = [at(ring + 1, step), at(ring + 1, step + 1)];
+            let faces = [[a, c, d], [a, d, b]];
+            triangles.extend(faces.into_iter().filter(|[a, b, c]| a != b && b != c && a != c));
+        }
+    }
+    Mesh::from_triangles("unit ball", &positions, &triangles)
+}
+
 /// Adds a flat convex polygon as triangles that look away from the origin.
 fn add_outward(positions: &[Vec3], triangles: &mut Vec<[u32; 3]>, corners: &[u32]) {
     let point = |index: u32| positions[index as usize];
@@ -188,5 +232,12 @@ mod tests {
         assert!((high - low - Vec3::new(0.04, 0.05, 0.03)).length() < 1e-6);
         assert!(mesh.is_closed());
         assert_eq!(mesh.triangle_count(), 6 * 2 + 12 * 2 + 8);
+    }
+
+    #[test]
+    fn a_ball_is_closed_and_round() {
+        let mesh = unit_ball().unwrap();
+        assert!(mesh.is_closed());
+        assert!(mesh.positions().iter().zip(mesh.normals()).all(|(p, n)| p.length() > 0.99 && p.dot(*n) > 0.98));
     }
 }

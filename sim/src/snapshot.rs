@@ -6,16 +6,9 @@
 //! on the same, so that whatever is forgotten here is found by the first test that reads a verdict.
 
 use crate::{
-    audit::Audit,
-    body::BodyState,
-    contact::{Contacts, TickForces},
-    event::Phase,
-    gripper::Grip,
-    oracle::JudgeState,
-    slip::SlipState,
-    world::World,
+    audit::Audit, body::BodyState, contact::Contacts, event::Phase, fluent::FluentState, mishap::MishapState,
+    oracle::JudgeState, robot::RobotState, world::World,
 };
-use acm_concept::pose::Pose;
 use bincode::Options;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -108,6 +101,8 @@ pub(crate) struct Eyes {
     pub(crate) noise: SavedRng,
     /// Number of the next frame.
     pub(crate) next: u64,
+    /// Colour and depth that each camera showed last, which a stuck one shows again.
+    pub(crate) shown: Vec<Option<(Vec<u8>, Vec<f32>)>>,
 }
 
 /// A random generator as numbers.
@@ -135,13 +130,11 @@ impl SavedRng {
 pub(crate) struct WorldState {
     physics: PhysicsWorld,
     bodies: Vec<BodyState>,
-    setpoint: f64,
-    target: Pose,
-    grip: Grip,
+    robot: RobotState,
     contacts: Contacts,
-    forces: TickForces,
     events: Vec<Phase>,
-    slip: Option<SlipState>,
+    mishaps: Vec<MishapState>,
+    fluents: FluentState,
     judge: JudgeState,
     audit: Audit,
     state: Vec<f64>,
@@ -155,13 +148,11 @@ impl WorldState {
         Ok(WorldState {
             physics: copy(&world.physics)?,
             bodies: world.bodies.iter().map(|body| body.state()).collect(),
-            setpoint: world.gripper.setpoint,
-            target: world.target,
-            grip: world.grip,
+            robot: world.robot.state(),
             contacts: world.contacts.clone(),
-            forces: world.forces.clone(),
             events: world.events.iter().map(|event| event.phase).collect(),
-            slip: world.slip.as_ref().map(|slip| slip.state()),
+            mishaps: world.mishaps.iter().map(|mishap| mishap.state()).collect(),
+            fluents: world.fluents.state(),
             judge: world.judge.state(),
             audit: world.audit.clone(),
             state: world.state.clone(),
@@ -175,7 +166,8 @@ impl WorldState {
         self.bodies.len() == world.bodies.len()
             && self.events.len() == world.events.len()
             && self.state.len() == world.state.len()
-            && self.slip.is_some() == world.slip.is_some()
+            && self.mishaps.len() == world.mishaps.len()
+            && self.robot.fits(&world.robot)
             && self.judge.fits(&world.judge)
             && self.physics.bodies.len() == world.physics.bodies.len()
             && self.physics.colliders.len() == world.physics.colliders.len()
@@ -187,15 +179,15 @@ impl WorldState {
         for (body, state) in world.bodies.iter_mut().zip(self.bodies) {
             body.set_state(state);
         }
-        world.gripper.setpoint = self.setpoint;
-        (world.target, world.grip) = (self.target, self.grip);
-        (world.contacts, world.forces) = (self.contacts, self.forces);
+        world.robot.set_state(self.robot);
+        world.contacts = self.contacts;
         for (event, phase) in world.events.iter_mut().zip(self.events) {
             event.phase = phase;
         }
-        if let (Some(slip), Some(state)) = (&mut world.slip, self.slip) {
-            slip.set_state(state);
+        for (mishap, state) in world.mishaps.iter_mut().zip(self.mishaps) {
+            mishap.set_state(state);
         }
+        world.fluents.set_state(self.fluents);
         world.judge.set_state(self.judge);
         (world.audit, world.state) = (self.audit, self.state);
         (world.steps, world.stopped) = (self.steps, self.stopped);

@@ -1,57 +1,66 @@
-//! The running world: physics, hand, mechanisms, what third parties do, and the judge who watches.
+//! The running world: physics, robot, mechanisms, what third parties do, and the judge who watches.
 
 use crate::{
-    audit::{self, Audit, AuditReport},
-    body::{Body, true_objects},
-    contact::{Contacts, TickForces},
+    audit::{Audit, AuditReport},
+    body::Body,
+    contact::Contacts,
     event::{self, Event},
-    gripper::{self, Grip, Gripper, TICK_S},
-    layout::{Layout, LayoutError, Placed},
+    fluent::Fluents,
+    layout::{Layout, LayoutError, number, vector},
+    mishap::{Mishap, MishapKind},
+    model::ObjectModel,
     oracle::{Judge, OracleVerdict},
+    placed::Placed,
     profile::PhysicsProfile,
-    report::{SimError, SimOptions, SimTimings, TrueObject},
-    scenario::{JudgeSpec, Scenario, SurfaceSpec, WorldSpec},
-    slip::Slip,
+    report::{SimError, SimOptions, SimTimings},
+    robot::{Robot, TICK_S},
+    scenario::{CameraSpec, JudgeSpec, Scenario, SurfaceSpec, WorldSpec},
     snapshot::WorldState,
     state,
+    truth::{TrueObject, true_objects},
 };
 use acm_concept::{
-    embodiment::{Command, EmbodimentError, Feedback, RobotDescription},
+    camera::{CameraModel, Mount},
+    embodiment::{Command, EmbodimentError, Feedback},
+    expression::Expression,
     pose::Pose,
     time::Time,
 };
+use acm_render::{Lighting, PointLight, Sun};
 use rapier3d::prelude::{ColliderBuilder, ColliderHandle, PhysicsWorld, RigidBodyBuilder, Vector};
 use rustix::time::ClockId;
+use std::sync::Arc;
 
 /// How long the world settles before the episode begins, seconds.
 const SETTLE_S: f64 = 0.5;
 /// An object that turns or shifts more than this while settling was not placed at rest: degrees, metres.
 const SETTLED: (f64, f64) = (3.0, 0.01);
-/// Commands may exceed the speed limits by this factor, which absorbs rounding.
-const TOLERANCE: f64 = 1.0 + 1e-6;
 
 /// Everything that is simulated. The episode's handles share one.
 pub(crate) struct World {
     pub(crate) physics: PhysicsWorld,
     pub(crate) profile: PhysicsProfile,
-    pub(crate) robot: RobotDescription,
-    pub(crate) gripper: Gripper,
+    pub(crate) robot: Robot,
     pub(crate) bodies: Vec<Body>,
+    /// Of the scenario's objects, in their order.
+    pub(crate) models: Vec<Arc<ObjectModel>>,
     pub(crate) surfaces: Vec<(ColliderHandle, SurfaceSpec)>,
     pub(crate) contacts: Contacts,
     pub(crate) timings: SimTimings,
-    /// The hand's commanded pose at the end of the last tick.
-    pub(crate) target: Pose,
-    pub(crate) grip: Grip,
     pub(crate) events: Vec<Event>,
-    pub(crate) slip: Option<Slip>,
+    pub(crate) mishaps: Vec<Mishap>,
+    pub(crate) fluents: Fluents,
     pub(crate) judge: Judge,
     pub(crate) audit: Audit,
+    pub(crate) lighting: Lighting,
+    /// Factors by which the cameras' colours are too bright.
+    pub(crate) exposures: Vec<f64>,
+    /// Names of the judge's variables, and their values.
+    pub(crate) variables: Vec<String>,
     pub(crate) state: Vec<f64>,
     pub(crate) constants: Vec<f64>,
     pub(crate) bystanders: Vec<usize>,
     pub(crate) steps: u64,
-    pub(crate) forces: TickForces,
     motion: bool,
     pub(crate) stopped: bool,
 }
@@ -79,11 +88,12 @@ impl World {
             spec.surfaces.iter().map(|surface| (insert_surface(&mut physics, surface), surface.clone())).collect();
         let insert =
             |object: &Placed| Body::insert(&mut physics, object.clone(), spec.objects[object.spec].count.is_some());
-        let bodies: Vec<Body> = layout.objects.iter().map(insert).collect();
-        let camera = spec.cameras.first().map(|camera| camera.model.clone());
-        let robot = gripper::description(spec.home, spec.workspace);
-        let gripper = Gripper::build(&mut physics, &robot);
+        let mut bodies: Vec<Body> = layout.objects.iter().map(insert).collect();
+        let robot = Robot::build(&mut physics, &spec.robot);
         let variables = state::names(scenario);
+        for body in &mut bodies {
+            body.set_shows(state::shows(&spec.objects[body.placed.spec], &variables));
+        }
         let layout_error = |source: LayoutError| SimError::Layout {
             scenario: scenario.name.clone(),
             seed: options.seed,
@@ -96,22 +106,23 @@ impl World {
             audit: Audit::default(),
             constants: state::constants(spec, layout),
             state: vec![0.0; variables.len()],
-            target: robot.home,
-            grip: Grip { opening_m: robot.max_opening_m, force_n: robot.max_grip_force_n },
-            slip: options.slip_at.map(|carry| Slip::new(carry, options.seed, camera)),
+            mishaps: mishaps(spec, options),
+            fluents: Fluents::build(spec, layout, &variables).map_err(layout_error)?,
+            lighting: lighting(spec, layout).map_err(layout_error)?,
+            exposures: exposures(spec, layout).map_err(layout_error)?,
             contacts: Contacts::default(),
-            forces: TickForces::default(),
             timings: SimTimings::default(),
             motion: options.motion,
             stopped: false,
             steps: 0,
             events,
+            models: spec.objects.iter().map(|object| object.model.clone()).collect(),
             surfaces,
             bodies,
-            gripper,
             robot,
             profile,
             physics,
+            variables,
         })
     }
 
@@ -119,8 +130,14 @@ impl World {
     fn settle(&mut self, seed: u64) -> Result<(), SimError> {
         let start: Vec<Pose> = self.bodies.iter().map(|body| body.pose(&self.physics)).collect();
         for _ in 0..(SETTLE_S / self.profile.step_s()).round() as u32 {
-            self.gripper.drive(&mut self.physics, &self.target, self.grip);
+            for body in &self.bodies {
+                body.act(&mut self.physics, &self.state);
+            }
+            self.robot.drive(&mut self.physics, 1.0, false);
             self.physics.step();
+            for body in &mut self.bodies {
+                body.measure(&self.physics);
+            }
         }
         for (body, start) in self.bodies.iter_mut().zip(start) {
             let pose = body.pose(&self.physics);
@@ -130,8 +147,9 @@ impl World {
                 return Err(SimError::Unstable { object: name, seed, turn_deg: turn, shift_m: shift });
             }
             body.start = pose;
+            body.measure(&self.physics);
         }
-        self.contacts.read(&self.physics, &self.gripper);
+        self.contacts.read(&self.physics, &self.robot);
         self.refresh_state();
         self.look_for_causes();
         Ok(())
@@ -153,97 +171,68 @@ impl World {
         if self.stopped {
             return Err(EmbodimentError::Stopped);
         }
-        if let Some(reason) = self.refusal(command) {
-            return Err(EmbodimentError::Refused { reason });
-        }
-        self.grip = Grip { opening_m: command.opening_m, force_n: command.grip_force_n };
-        self.tick(command.tcp);
-        Ok(self.feedback())
+        self.robot.aim(command).map_err(|reason| EmbodimentError::Refused { reason })?;
+        self.tick().map_or_else(|| Ok(self.feedback()), |reason| Err(EmbodimentError::ProtectiveStop { reason }))
     }
 
-    fn refusal(&self, command: &Command) -> Option<String> {
-        let robot = &self.robot;
-        if !(command.tcp.is_valid() && command.opening_m.is_finite() && command.grip_force_n.is_finite()) {
-            return Some("it holds numbers that are not finite, or a rotation that is not one".into());
-        }
-        if !robot.reaches(command.tcp.translation) {
-            let (low, high) = (robot.workspace_min, robot.workspace_max);
-            return Some(format!("{} lies outside of the workspace {low} to {high} m", command.tcp.translation));
-        }
-        let shift = command.tcp.translation.distance(self.target.translation) / robot.tick_s;
-        if shift > robot.max_speed_m_s * TOLERANCE {
-            return Some(format!("it asks for {shift:.3} m/s, the fastest is {} m/s", robot.max_speed_m_s));
-        }
-        let turn = command.tcp.angle_to(&self.target) / robot.tick_s;
-        // The angle between nearly equal rotations is only known to about 1e-7.
-        if turn > robot.max_turn_rad_s * TOLERANCE + 1e-4 {
-            return Some(format!("it asks for {turn:.3} rad/s, the fastest is {} rad/s", robot.max_turn_rad_s));
-        }
-        if !(0.0..=robot.max_opening_m * TOLERANCE).contains(&command.opening_m) {
-            return Some(format!("an opening of {} m is not in 0 to {} m", command.opening_m, robot.max_opening_m));
-        }
-        if !(0.0..=robot.max_grip_force_n * TOLERANCE).contains(&command.grip_force_n) {
-            return Some(format!("a force of {} N is not in 0 to {} N", command.grip_force_n, robot.max_grip_force_n));
-        }
-        None
-    }
-
-    /// Advances by one control tick while the commanded pose moves evenly to `target`.
-    fn tick(&mut self, target: Pose) {
+    /// Advances by one control tick while the robot moves evenly to its aim. Says why it stopped on the way.
+    fn tick(&mut self) -> Option<String> {
         let started = cpu_s(ClockId::ThreadCPUTime);
-        let from = self.target;
         let steps = (TICK_S * f64::from(self.profile.steps_per_second)).round() as u32;
-        self.forces = TickForces::default();
+        self.robot.begin();
         for step in 1..=steps {
-            self.step(&from.interpolate(&target, f64::from(step) / f64::from(steps)));
+            self.step(f64::from(step) / f64::from(steps));
         }
-        self.target = target;
-        let (tcp, now_s) = (self.gripper.tcp(&self.physics), self.seconds());
-        let pads = self.forces.mean().0.map(|force| tcp.inverse().transform_vector(force));
-        self.audit.grip(pads, self.robot.max_grip_force_n, now_s);
+        let hands: Vec<_> = self.robot.hands(&self.physics).collect();
+        self.audit.grip(&hands, self.seconds());
         self.timings.physics_s += cpu_s(ClockId::ThreadCPUTime) - started;
+        self.robot.end()
     }
 
-    fn step(&mut self, target: &Pose) {
+    /// One physics step; `fraction` is the share of the control tick that is behind after it.
+    fn step(&mut self, fraction: f64) {
         let now_s = self.seconds();
         for event in &mut self.events {
             event.step(&mut self.physics, &mut self.bodies, &self.state, now_s);
         }
-        self.gripper.drive(&mut self.physics, target, self.grip);
+        for body in &self.bodies {
+            body.act(&mut self.physics, &self.state);
+        }
+        let drops = self.mishaps.iter().any(|mishap| mishap.drops(self));
+        self.robot.drive(&mut self.physics, fraction, drops);
         self.physics.step();
         self.steps += 1;
         for body in &mut self.bodies {
-            body.count_presses(&self.physics);
+            body.measure(&self.physics);
         }
-        self.contacts.read(&self.physics, &self.gripper);
-        self.forces.add(&self.contacts, self.gripper.wrist_force(&self.physics));
-        // Taken out and put back, because what happens in a slip looks at the whole world.
-        if let Some(mut slip) = self.slip.take() {
-            slip.step(self);
-            self.slip = Some(slip);
+        self.contacts.read(&self.physics, &self.robot);
+        self.robot.feel(&self.physics, &self.contacts);
+        // Taken out and put back, because what happens in a mishap looks at the whole world.
+        let mut mishaps = std::mem::take(&mut self.mishaps);
+        for mishap in &mut mishaps {
+            mishap.step(self);
         }
+        self.mishaps = mishaps;
         self.look_for_causes();
+        self.fluents.step(&self.state, self.profile.step_s());
         self.refresh_state();
         self.judge.step(&self.state, self.seconds(), self.profile.step_s());
     }
 
     fn look_for_causes(&mut self) {
-        let robot = audit::Robot {
-            bodies: &self.gripper.bodies(),
-            tcp: self.gripper.tcp(&self.physics),
-            max_speed_m_s: self.robot.max_speed_m_s,
-        };
-        self.audit.step(&self.physics, &robot, self.seconds());
+        let hands: Vec<_> = self.robot.hands(&self.physics).collect();
+        let now_s = self.seconds();
+        self.audit.step(&self.physics, &self.robot.bodies(), &hands, now_s);
     }
 
     /// What happened without a cause so far.
     pub(crate) fn audit(&self) -> &AuditReport {
         self.audit.report()
     }
-    /// Something outside of the world moves a body on purpose.
+    /// Something outside of the world moves an object on purpose.
     pub(crate) fn excuse(&mut self, body: usize) {
-        if let Some(body) = self.bodies.get(body) {
-            self.audit.excuse(body.handle);
+        for handle in self.bodies.get(body).into_iter().flat_map(Body::handles) {
+            self.audit.excuse(handle);
         }
     }
 
@@ -253,30 +242,37 @@ impl World {
         self.state = values;
     }
 
+    /// A camera with its pose in the world, wherever it is mounted. The hand's pose is measured without error, so that
+    /// the same serves for the true and for the nominal camera.
+    pub(crate) fn placed(&self, camera: &CameraModel) -> CameraModel {
+        match camera.mount {
+            Mount::World => camera.clone(),
+            Mount::Hand => {
+                let pose = self.robot.tcp(&self.physics) * camera.pose;
+                CameraModel { pose, ..camera.clone() }
+            }
+        }
+    }
+
+    /// Whether a camera is stuck at its last picture.
+    pub(crate) fn is_frozen(&self, camera: usize) -> bool {
+        self.events.iter().any(|event| event.freezes(camera))
+    }
+
     /// Whether someone stands before a camera.
     pub(crate) fn is_covered(&self, camera: usize) -> bool {
         self.events.iter().any(|event| event.covers(camera))
     }
 
-    /// What the hand measures.
+    /// What the robot measures.
     pub(crate) fn feedback(&self) -> Feedback {
-        let tcp = self.gripper.tcp(&self.physics);
-        let (pads, wrist) = self.forces.mean();
-        Feedback {
-            time: self.now(),
-            tcp,
-            joints: Vec::new(),
-            opening_m: self.gripper.opening(&self.physics),
-            commanded_opening_m: self.grip.opening_m,
-            pad_force_n: pads.map(|force| tcp.inverse().transform_vector(force)),
-            wrist_force_n: wrist,
-        }
+        self.robot.feedback(&self.physics, self.now())
     }
 
-    /// Stops all motion; the hand stays where it is.
+    /// Stops all motion; the robot stays where it is.
     pub(crate) fn stop(&mut self) {
         self.stopped = true;
-        self.target = self.gripper.tcp(&self.physics);
+        self.robot.stop(&self.physics);
     }
 
     /// Takes a stop back.
@@ -291,7 +287,9 @@ impl World {
             return Err(EmbodimentError::Refused { reason });
         }
         while self.now() < moment {
-            self.tick(self.target);
+            if let Some(reason) = self.tick() {
+                return Err(EmbodimentError::ProtectiveStop { reason });
+            }
         }
         Ok(self.now())
     }
@@ -302,7 +300,7 @@ impl World {
         let Ok(now) = WorldState::of(self) else { return self.audit.void(self.judge.verdict(&self.state)) };
         let until = self.seconds() + self.judge.settle_s();
         while self.seconds() < until {
-            self.step(&self.target.clone());
+            self.step(1.0);
         }
         let verdict = self.judge.verdict(&self.state);
         now.put_into(self);
@@ -322,6 +320,45 @@ fn insert_surface(physics: &mut PhysicsWorld, surface: &SurfaceSpec) -> Collider
     let body = RigidBodyBuilder::fixed().translation(surface.position.as_vec3());
     let collider = ColliderBuilder::cuboid(half.x, half.y, half.z).friction(surface.friction as f32);
     physics.insert(body, collider).1
+}
+
+/// What the scenario and the run want to go wrong.
+fn mishaps(spec: &WorldSpec, options: &SimOptions) -> Vec<Mishap> {
+    let camera = spec.cameras.first().map(|camera| camera.model.clone());
+    let asked = [(MishapKind::Slip, options.slip_at), (MishapKind::Drop, options.drop_at)];
+    let asked = asked.into_iter().filter_map(|(kind, carry)| Some((kind, carry?)));
+    let all = spec.mishaps.iter().copied().chain(asked);
+    all.map(|(kind, carry)| Mishap::new(kind, carry, options.seed, camera.clone())).collect()
+}
+
+fn lighting(spec: &WorldSpec, layout: &Layout) -> Result<Lighting, LayoutError> {
+    let Some(light) = &spec.lighting else { return Ok(Lighting::default()) };
+    let scope = layout.scope();
+    let number = |expression: &Expression| number("light", expression, &scope);
+    let point = |(position, intensity): &([Expression; 3], Expression)| {
+        Ok(PointLight { position: vector("light", position, &scope)?, intensity: number(intensity)? as f32 })
+    };
+    let direction = vector("light", &light.sun_direction, &scope)?;
+    Ok(Lighting {
+        ambient: number(&light.ambient)? as f32,
+        sun: Sun { direction, intensity: number(&light.sun)? as f32, ..Lighting::default().sun },
+        points: light.points.iter().map(point).collect::<Result<_, LayoutError>>()?,
+    })
+}
+
+fn exposures(spec: &WorldSpec, layout: &Layout) -> Result<Vec<f64>, LayoutError> {
+    let scope = layout.scope();
+    let exposure = |camera: &CameraSpec| {
+        let (name, range) = (&camera.model.name, 0.05..=20.0);
+        let value = number(name, &camera.exposure, &scope)?;
+        let reason = || format!("an exposure of {value} must lie in {} to {}", range.start(), range.end());
+        if range.contains(&value) {
+            Ok(value)
+        } else {
+            Err(LayoutError::Value { name: name.clone(), reason: reason() })
+        }
+    };
+    spec.cameras.iter().map(exposure).collect()
 }
 
 /// Places of the objects that the task is not to move.

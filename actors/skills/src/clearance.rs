@@ -165,6 +165,7 @@ mod tests {
             max_turn_rad_s: 2.0,
             tick_s: 0.02,
             home: downward(DVec3::new(0.0, -0.4, 0.4), 0.0),
+            ..RobotDescription::default()
         }
     }
 
@@ -206,6 +207,7 @@ mod tests {
             commanded_opening_m: 0.08,
             pad_force_n: [DVec3::ZERO; 2],
             wrist_force_n: DVec3::ZERO,
+            ..acm_concept::embodiment::Feedback::default()
         };
         let hand = Hand::new(&robot(), &feedback);
         let height = |obstacle| safe_height(&hand, DVec3::ZERO, DVec3::X * 0.3, &[obstacle], 0.0, 0.03);

@@ -1,7 +1,11 @@
 //! What a controller is, how one is started, and why one cannot be.
 
 use crate::{
-    functions::{grasp_from_above::GraspFromAbove, place_upright::PlaceUpright, press_down::PressDown},
+    arm::choice::choose,
+    functions::{
+        grasp_from_above::GraspFromAbove, place_upright::PlaceUpright, press_down::PressDown,
+        suck_from_above::SuckFromAbove,
+    },
     hand::Hand,
     run::Run,
 };
@@ -122,8 +126,15 @@ pub fn start(
     robot: &RobotDescription,
     feedback: &Feedback,
 ) -> Result<Box<dyn Controller>, StartError> {
-    let hand = Hand::new(robot, feedback);
+    let arm = choose(invocation, robot, feedback);
+    let hand = Hand::for_skill(invocation, robot, feedback, arm);
+    let feedback = feedback.of_arm(arm).unwrap_or(feedback);
     Ok(match invocation.kind.as_str() {
+        // What a hand does to take a part from above depends on the hand.
+        "grasp-from-above" if hand.robot.suction.is_some() => {
+            let function = SuckFromAbove::plan(invocation, &hand, feedback)?;
+            Box::new(Run::new(invocation, hand, function))
+        }
         "grasp-from-above" => {
             let function = GraspFromAbove::plan(invocation, &hand, feedback)?;
             Box::new(Run::new(invocation, hand, function))

@@ -24,13 +24,15 @@
 //! |---|---|
 //! | [`controller`] | [`start`], [`kinds`], what a controller is and why one cannot start |
 //! | `functions` | the function kinds: sequences of primitives with what the hand felt |
-//! | `primitives` | reach, grasp, move, push, release: state machines with intermediate checks |
+//! | `primitives` | reach, grasp (with fingers or a cup), move, push, release: state machines with intermediate checks |
 //! | [`retreat`](mod@retreat) | the motion home, so that the cameras see the table |
 //! | `run` | performs a function primitive by primitive and writes the report |
+//! | `arm` | for robots with joints: inverse kinematics, planning round what is perceived, which arm |
 //! | `motion`, `descent`, `clearance`, `geometry`, `hand` | paths, guarded lowering, free space, frames, what the hand felt and was told |
 //!
 //! The hand works pointing down: the TCP's z axis along the world's -z.
 
+mod arm;
 mod clearance;
 pub mod controller;
 mod descent;

@@ -47,7 +47,7 @@ impl Pace {
 
 /// The time law of a leg over its unit length: even acceleration, even speed, even deceleration.
 #[derive(Debug, Clone, Copy)]
-struct Trapezoid {
+pub(crate) struct Trapezoid {
     speed: f64,
     ramp_s: f64,
     duration_s: f64,
@@ -58,12 +58,20 @@ impl Trapezoid {
     fn new(pace: &Pace, distance_m: f64, angle_rad: f64) -> Trapezoid {
         let fastest = |shift: f64, turn: f64| (shift / distance_m.max(1e-12)).min(turn / angle_rad.max(1e-12));
         let acceleration = fastest(pace.acceleration_m_s2, pace.turn_acceleration_rad_s2);
-        let speed = fastest(pace.speed_m_s, pace.turn_rad_s).min(acceleration.sqrt());
+        Trapezoid::fastest(fastest(pace.speed_m_s, pace.turn_rad_s), acceleration)
+    }
+    /// The fastest within these bounds, in unit lengths per second and per second squared.
+    pub fn fastest(speed: f64, acceleration: f64) -> Trapezoid {
+        let speed = speed.min(acceleration.sqrt());
         let ramp_s = speed / acceleration;
         Trapezoid { speed, ramp_s, duration_s: 1.0 / speed + ramp_s }
     }
+    /// How long the leg takes, seconds.
+    pub fn duration_s(&self) -> f64 {
+        self.duration_s
+    }
     /// The share of the leg that is behind after a share of its duration.
-    fn fraction(&self, share: f64) -> f64 {
+    pub fn fraction(&self, share: f64) -> f64 {
         let (gone_s, left_s) = (share * self.duration_s, (1.0 - share) * self.duration_s);
         if gone_s < self.ramp_s {
             0.5 * self.speed * gone_s * gone_s / self.ramp_s
@@ -92,6 +100,9 @@ pub(crate) struct Path {
     duration_s: f64,
     pace: Pace,
     tick_s: f64,
+    /// Whether any way will do that keeps clear of things; a straight one must be kept.
+    travels: bool,
+    begun: bool,
 }
 
 impl Path {
@@ -110,7 +121,8 @@ impl Path {
             ticks_in_all += ticks;
             at = to;
         }
-        Path { legs, done_ticks: 0, end: at, duration_s: f64::from(ticks_in_all) * tick_s, pace, tick_s }
+        let duration_s = f64::from(ticks_in_all) * tick_s;
+        Path { legs, done_ticks: 0, end: at, duration_s, pace, tick_s, travels: false, begun: false }
     }
     /// Up to `height_m`, level to above the goal, and straight down to it. A start above that height is left on a
     /// slant that stays above it.
@@ -118,7 +130,9 @@ impl Path {
         let height_m = height_m.max(goal.translation.z);
         let up = from.translation.with_z(from.translation.z.max(height_m));
         let across = goal.translation.with_z(height_m);
-        Path::through(from, &[Pose::new(up, from.rotation), Pose::new(across, goal.rotation), goal], pace, tick_s)
+        let path =
+            Path::through(from, &[Pose::new(up, from.rotation), Pose::new(across, goal.rotation), goal], pace, tick_s);
+        Path { travels: true, ..path }
     }
     /// Straight up or down to a height.
     pub fn vertical(from: Pose, height_m: f64, pace: Pace, tick_s: f64) -> Path {
@@ -127,6 +141,7 @@ impl Path {
     }
     /// The pose at the end of the next tick, or `None` when the path is done.
     pub fn advance(&mut self) -> Option<Pose> {
+        self.begun = true;
         let leg = self.legs.front()?;
         self.done_ticks += 1;
         if self.done_ticks >= leg.ticks {
@@ -141,15 +156,31 @@ impl Path {
     /// Begins anew from a pose at rest, through the waypoints that are left.
     pub fn restart(&mut self, from: Pose) {
         let waypoints: Vec<Pose> = self.legs.iter().map(|leg| leg.to).collect();
-        *self = Path::through(from, &waypoints, self.pace, self.tick_s);
+        *self = Path { travels: self.travels, ..Path::through(from, &waypoints, self.pace, self.tick_s) };
+    }
+    /// Marks it as begun; true if it had not been.
+    pub fn begin(&mut self) -> bool {
+        !std::mem::replace(&mut self.begun, true)
+    }
+    /// Leaves out all that is left: an arm gets to its end another way.
+    pub fn finish(&mut self) {
+        self.legs.clear();
+    }
+    /// Whether any way to its end will do that keeps clear of things.
+    pub fn travels(&self) -> bool {
+        self.travels
+    }
+    /// How fast it may be.
+    pub fn pace(&self) -> Pace {
+        self.pace
     }
     /// Where it ends.
     pub fn end(&self) -> Pose {
         self.end
     }
-    /// How long the whole path takes, seconds.
-    pub fn duration_s(&self) -> f64 {
-        self.duration_s
+    /// How long the whole path takes at most, seconds: an arm may find another way to its end, which is longer.
+    pub fn longest_s(&self) -> f64 {
+        if self.travels { 3.0 * self.duration_s + 4.0 } else { self.duration_s }
     }
 }
 

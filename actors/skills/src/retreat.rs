@@ -61,10 +61,12 @@ pub enum RetreatTick {
 /// ```
 pub fn retreat(robot: &RobotDescription, feedback: &Feedback) -> Retreat {
     let hand = Hand::new(robot, feedback);
+    let robot = &robot.only(feedback.arm);
     let holding = holds_something(feedback);
     let pace = if holding { Pace::carrying(robot) } else { Pace::free(robot) };
     let heading = robot.home.yaw();
-    let turn = nearest_heading(heading, feedback.tcp.yaw()) - heading;
+    // Half a turn more or less looks the same to a floating hand; an arm goes home to the joints it waits at.
+    let turn = if robot.arm.is_some() { 0.0 } else { nearest_heading(heading, feedback.tcp.yaw()) - heading };
     let home = Pose::new(robot.home.translation, DQuat::from_rotation_z(turn) * robot.home.rotation);
     let path = Path::over(hand.command.tcp, home, home.translation.z, pace, robot.tick_s);
     Retreat { hand, path, holding, started: None, settle_ticks: 0, failure: None, finished: None }
@@ -78,17 +80,21 @@ impl Retreat {
         if let Some(report) = &self.finished {
             return RetreatTick::Finished(report.clone());
         }
-        if self.holding && feedback.opening_m < CLOSED_M {
+        let lost = feedback.opening_m < CLOSED_M && !holds_something(feedback);
+        if self.holding && lost {
             self.holding = false;
-            self.failure = Some("what was held was lost on the way: the fingers closed".into());
+            self.failure = Some("what was held was lost on the way".into());
         }
         let force_n = self.hand.felt_n().length();
         if force_n > COLLISION_N {
             return self.finish(feedback, Some(format!("felt {force_n:.0} N on the way home")));
         }
-        if let Some(next) = self.path.advance() {
-            self.hand.command.tcp = next;
-            return RetreatTick::Act(self.hand.command());
+        if self.hand.follow(&mut self.path) {
+            let command = self.hand.command();
+            return match self.hand.fault() {
+                Some(reason) => self.finish(feedback, Some(reason)),
+                None => RetreatTick::Act(command),
+            };
         }
         let distance_m = feedback.tcp.translation.distance(self.path.end().translation);
         if distance_m < THERE_M {

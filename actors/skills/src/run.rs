@@ -120,7 +120,13 @@ impl<F: Function> Run<F> {
                     running.primitive.tick(&mut self.hand, feedback)
                 };
                 match step {
-                    Step::Act => return Tick::Act(self.hand.command()),
+                    Step::Act => {
+                        let command = self.hand.command();
+                        match self.hand.fault() {
+                            Some(reason) => return self.fail(feedback, Failure::new(FailureCause::Motion, reason)),
+                            None => return Tick::Act(command),
+                        }
+                    }
                     Step::Done(outcome) => {
                         self.close_primitive(feedback, None);
                         last = Some(outcome);
@@ -153,6 +159,7 @@ impl<F: Function> Run<F> {
     fn fail(&mut self, feedback: &Feedback, failure: Failure) -> Tick {
         self.close_primitive(feedback, Some(failure.reason.clone()));
         if failure.empty_handed {
+            self.hand.command.vacuum = false;
             self.notes.feel_empty(self.function.object());
         }
         self.failure = Some((failure.cause, failure.reason));
@@ -164,13 +171,9 @@ impl<F: Function> Run<F> {
 
     /// Straight up, with the fingers as they are and whatever is felt; as long as the path, and no longer.
     fn withdraw(&mut self, feedback: &Feedback) -> Tick {
-        match self.withdrawal.as_mut().and_then(Path::advance) {
-            Some(next) => {
-                self.hand.command.tcp = next;
-                Tick::Act(self.hand.command())
-            }
-            None => self.finish(feedback),
-        }
+        let flying = self.withdrawal.as_mut().is_some_and(|path| self.hand.follow(path));
+        let command = self.hand.command();
+        if flying && self.hand.fault().is_none() { Tick::Act(command) } else { self.finish(feedback) }
     }
 
     fn finish(&mut self, feedback: &Feedback) -> Tick {
@@ -196,6 +199,8 @@ impl<F: Function> Controller for Run<F> {
             return Tick::Finished(report.clone());
         }
         self.started.get_or_insert(feedback.time);
+        // At first another arm may have been the last to move.
+        let feedback = feedback.of_arm(self.hand.command.arm).unwrap_or(feedback);
         self.hand.observe(feedback);
         if self.withdrawal.is_some() { self.withdraw(feedback) } else { self.advance(feedback) }
     }

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 fn episode(instruction_at_s: f64, until: Option<Until>) -> Episode {
     let budgets = Budgets { seconds: 10.0, skills: 3, frames: 30 };
-    let task = TaskSpec { instruction: "Wave.".into(), instruction_at_s, budgets, cameras: vec![] };
+    let task = TaskSpec { instruction: "Wave.".into(), instruction_at_s, budgets, then: vec![], cameras: vec![] };
     Episode::new(task, None).until(until)
 }
 
@@ -31,10 +31,10 @@ fn begin(episode: &mut Episode, seconds: f64) -> Message {
 fn who_joins_after_the_instruction_gets_it_at_once_with_the_whole_budget() {
     let mut late = episode(2.0, None);
     assert!(matches!(begin(&mut late, 50.0), Message::Parse { .. }));
-    assert_eq!(late.deadline, Time::from_seconds(60.0));
+    assert_eq!(late.asked.deadline(), Time::from_seconds(60.0));
     let mut early = episode(2.0, None);
     assert!(matches!(begin(&mut early, 0.5), Message::Look { .. }));
-    assert_eq!(early.deadline, Time::from_seconds(12.0));
+    assert_eq!(early.asked.deadline(), Time::from_seconds(12.0));
 }
 
 #[test]

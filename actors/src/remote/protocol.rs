@@ -140,6 +140,8 @@ pub enum Refusal {
     MotionDisabled,
     /// A stop was commanded before.
     Stopped,
+    /// The arm met something and stopped by itself.
+    ProtectiveStop,
     /// The robot failed, or the camera.
     Failed,
 }
@@ -151,6 +153,7 @@ impl Refusal {
             EmbodimentError::Refused { reason } => (Refusal::Limits, reason.clone()),
             EmbodimentError::MotionDisabled => (Refusal::MotionDisabled, error.to_string()),
             EmbodimentError::Stopped => (Refusal::Stopped, error.to_string()),
+            EmbodimentError::ProtectiveStop { reason } => (Refusal::ProtectiveStop, reason.clone()),
             EmbodimentError::Failed { reason } => (Refusal::Failed, reason.clone()),
         }
     }
@@ -160,6 +163,7 @@ impl Refusal {
             Refusal::Limits => EmbodimentError::Refused { reason },
             Refusal::MotionDisabled => EmbodimentError::MotionDisabled,
             Refusal::Stopped => EmbodimentError::Stopped,
+            Refusal::ProtectiveStop => EmbodimentError::ProtectiveStop { reason },
             Refusal::Failed => EmbodimentError::Failed { reason },
         }
     }

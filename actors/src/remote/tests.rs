@@ -6,7 +6,7 @@ use super::{
     *,
 };
 use acm_concept::{
-    camera::{CameraError, CameraModel, CameraSource, FrameHeader, Intrinsics, RgbdFrame},
+    camera::{CameraError, CameraModel, CameraSource, FrameHeader, Intrinsics, Mount, RgbdFrame},
     embodiment::{Clock, Command, Embodiment, EmbodimentError, Feedback, RobotDescription},
     ids::FrameId,
     pose::Pose,
@@ -39,6 +39,7 @@ fn camera() -> CameraModel {
         pose: Pose::IDENTITY,
         depth_min_m: 0.1,
         depth_max_m: 3.0,
+        mount: Mount::World,
     }
 }
 
@@ -57,6 +58,7 @@ fn description() -> &'static RobotDescription {
         max_turn_rad_s: 2.0,
         tick_s: 0.02,
         home: Pose::IDENTITY,
+        ..RobotDescription::default()
     })
 }
 
@@ -124,6 +126,7 @@ fn task() -> TaskSpec {
         instruction_at_s: 0.25,
         budgets: Budgets { seconds: 10.0, skills: 3, frames: 30 },
         cameras: vec![camera()],
+        then: vec![],
     }
 }
 
@@ -136,6 +139,7 @@ fn toy() -> Host {
         commanded_opening_m: 0.08,
         pad_force_n: [DVec3::ZERO; 2],
         wrist_force_n: DVec3::new(1.0 / 3.0, -0.0, 1e-300),
+        ..Feedback::default()
     };
     let toy = Handle(Arc::new(Mutex::new(Toy { feedback, stopped: false, frames: 0 })));
     let again = toy.clone();
@@ -191,7 +195,7 @@ impl Drop for Served {
 }
 
 fn to(x: f64) -> Command {
-    Command { tcp: Pose::from_translation(DVec3::new(x, 0.1, 0.2)), opening_m: 0.05, grip_force_n: 7.0 }
+    Command::hand(Pose::from_translation(DVec3::new(x, 0.1, 0.2)), 0.05, 7.0)
 }
 
 #[test]
@@ -344,8 +348,20 @@ fn liar(change: (&str, &str), then: &'static [&'static str]) -> (tempfile::TempD
     (dir, Address::Unix(path))
 }
 
+const JOINT: &str = r#"[{"name":"elbow","frame":{"translation":[0,0,0],"rotation":[0,0,0,1]},"axis":[0,0,1],"min_rad":-2,
+    "max_rad":2,"max_speed_rad_s":1,"max_acceleration_rad_s2":1,"max_torque_nm":1}]"#;
+
+/// The fields of a robot that say that it has an arm.
+fn arm(home: &str, joints: &str) -> String {
+    let here = r#"{"translation":[0,0,0],"rotation":[0,0,0,1]}"#;
+    let arm = format!(r#"{{"base":{here},"tool":{here},"home":{home},"joints":{joints},"capsules":[],"hand":[]}}"#);
+    // A message is one line.
+    format!(r#""tick_s":0.02,"arm":{arm}"#).replace('\n', "")
+}
+
 #[test]
 fn what_a_host_tells_of_itself_is_checked() {
+    let second = serde_json::to_string(description()).unwrap();
     for (from, to, part) in [
         (r#""protocol":1"#, r#""protocol":2"#, "version 2"),
         (r#""width":32"#, r#""width":4000000000"#, "intrinsics"),
@@ -354,6 +370,10 @@ fn what_a_host_tells_of_itself_is_checked() {
         (r#""seconds":10.0"#, r#""seconds":-1.0"#, "budget"),
         (r#""answer":"hello""#, r#""answer":"stopped""#, "stopped to hello"),
         (r#""robot""#, r#""rowboat""#, "missing field `robot`"),
+        (r#""tick_s":0.02"#, &arm("[0.0]", "[]"), "an arm of 0 joints with 1 home positions"),
+        (r#""tick_s":0.02"#, &arm("[3.0]", JOINT), "an arm's home is beyond its limits: elbow at 3.0000 rad"),
+        (r#""tick_s":0.02"#, &arm("[1.0]", JOINT), "its feedback has 0 joints for the 1 of arm 0"),
+        (r#""tick_s":0.02"#, &format!(r#""tick_s":0.02,"others":[{second}]"#), "its feedback says nothing of arm 1"),
     ] {
         let (_dir, address) = liar((from, to), &[]);
         let outcome = RemoteRobot::connect(&address, "tester", FrameMode::Auto);

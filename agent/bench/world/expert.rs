@@ -40,7 +40,7 @@ impl Expert {
     /// One control tick towards a pose.
     fn tick(&mut self, tcp: Pose) -> Result<Feedback, EmbodimentError> {
         self.tcp = tcp;
-        let command = Command { tcp, opening_m: self.opening_m, grip_force_n: GRIP_N };
+        let command = Command::hand(tcp, self.opening_m, GRIP_N);
         self.commands.push(command);
         self.robot.command(&command)
     }

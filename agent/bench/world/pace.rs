@@ -141,6 +141,7 @@ fn invocation(kind: &str, base: Pose, frame_height_m: f64, arguments: &[(&str, f
         obstacles: Vec::new(),
         support_height_m: base.translation.z,
         held: None,
+        held_solids: Vec::new(),
         attempt: 0,
     }
 }

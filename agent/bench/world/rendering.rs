@@ -9,7 +9,7 @@ use crate::{
     cli::BenchArgs,
 };
 use acm_concept::{
-    camera::{CameraModel, Intrinsics},
+    camera::{CameraModel, Intrinsics, Mount},
     pose::Pose,
 };
 use acm_render::{Instance, Lighting, Material, Mesh, Renderer, Scene, Sun};
@@ -131,6 +131,7 @@ fn camera() -> CameraModel {
         pose: Pose::new(DVec3::new(0.0, -0.45, 0.65), DQuat::from_rotation_x(PI + 0.6)),
         depth_min_m: 0.1,
         depth_max_m: 6.0,
+        mount: Mount::World,
     }
 }
 

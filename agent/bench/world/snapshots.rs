@@ -168,7 +168,7 @@ fn motion(dice: &mut Dice, player: &Player) -> Vec<Command> {
         let way = from.translation.distance(to.translation).max(0.2 * from.angle_to(&to));
         let ticks = (way / (0.8 * robot.max_speed_m_s * robot.tick_s)).ceil().max(10.0) as usize;
         let pose = |tick: usize| from.interpolate(&to, tick as f64 / ticks as f64);
-        let command = |tick| Command { tcp: pose(tick), opening_m, grip_force_n: 20.0 };
+        let command = |tick| Command::hand(pose(tick), opening_m, 20.0);
         commands.extend((1..=ticks).map(command));
         if dice.below(2) == 0 {
             opening_m = if opening_m > 0.0 { 0.0 } else { robot.max_opening_m };

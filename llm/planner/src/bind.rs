@@ -100,9 +100,10 @@ pub(crate) fn bind(step: &Step, view: &dyn MemoryView, robot: &RobotDescription)
         frame,
         arguments,
         destination: candidate.destination,
-        obstacles: obstacles(view, part_id.object),
+        obstacles: obstacles(view),
         support_height_m,
         held: held(view),
+        held_solids: view.held().map_or_else(Vec::new, |entry| solids_at(view, entry, &Pose::IDENTITY)),
         attempt: step.attempt,
     })
 }
@@ -161,9 +162,9 @@ fn surface_height(view: &dyn MemoryView, support: Option<ObjectId>, spot: DVec3)
     }
 }
 
-fn obstacles(view: &dyn MemoryView, target: ObjectId) -> Vec<(ObjectId, PlacedSolid)> {
+fn obstacles(view: &dyn MemoryView) -> Vec<(ObjectId, PlacedSolid)> {
     let mut obstacles = Vec::new();
-    for entry in view.objects().iter().filter(|e| e.id != target && e.presence == Presence::Present) {
+    for entry in view.objects().iter().filter(|e| e.presence == Presence::Present) {
         let Some(pose) = entry.pose() else { continue };
         obstacles.extend(solids_at(view, entry, &pose).into_iter().map(|solid| (entry.id, solid)));
     }

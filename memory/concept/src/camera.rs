@@ -66,6 +66,17 @@ impl Intrinsics {
     }
 }
 
+/// What carries a camera.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Mount {
+    /// It stands still.
+    #[default]
+    World,
+    /// It moves with the robot's hand.
+    Hand,
+}
+
 /// A camera as the agent is told of it: the *nominal* calibration, never the true one.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CameraModel {
@@ -73,8 +84,12 @@ pub struct CameraModel {
     pub name: String,
     /// Nominal intrinsics, shared by colour and registered depth.
     pub intrinsics: Intrinsics,
-    /// Nominal pose of the camera frame (x right, y down, z forward) in the world.
+    /// Nominal pose of the camera frame (x right, y down, z forward) in the world, or in the frame of the tool centre
+    /// point where the hand carries it.
     pub pose: Pose,
+    /// What carries it.
+    #[serde(default)]
+    pub mount: Mount,
     /// Depths nearer than this are not measured, metres.
     pub depth_min_m: f64,
     /// Depths farther than this are not measured, metres.

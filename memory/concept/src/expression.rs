@@ -59,25 +59,43 @@ pub enum ExpressionError {
     },
 }
 
+/// What is added to the priorities of arithmetic, to leave room below for comparisons, `&&` and `||`.
+const ARITHMETIC_PRIORITY: i64 = 3;
+
 #[derive(Clone, Debug)]
 struct Operators;
 
 impl exmex::MakeOperators<f64> for Operators {
     fn make<'a>() -> Vec<exmex::Operator<'a, f64>> {
-        let mut operators = exmex::FloatOpsFactory::<f64>::make();
         fn as_number(holds: bool) -> f64 {
             if holds { 1.0 } else { 0.0 }
         }
+        // A sign before brackets is lost if an operator inside has a priority below 0; so arithmetic moves up instead.
+        let mut operators: Vec<_> = exmex::FloatOpsFactory::<f64>::make().into_iter().map(raised).collect();
         let binary = |apply: fn(f64, f64) -> f64, prio: i64| exmex::BinOp { apply, prio, is_commutative: false };
         operators.extend([
-            exmex::Operator::make_bin("<", binary(|a, b| as_number(a < b), -1)),
-            exmex::Operator::make_bin("<=", binary(|a, b| as_number(a <= b), -1)),
-            exmex::Operator::make_bin(">", binary(|a, b| as_number(a > b), -1)),
-            exmex::Operator::make_bin(">=", binary(|a, b| as_number(a >= b), -1)),
-            exmex::Operator::make_bin("&&", binary(|a, b| as_number(a != 0.0 && b != 0.0), -2)),
-            exmex::Operator::make_bin("||", binary(|a, b| as_number(a != 0.0 || b != 0.0), -3)),
+            exmex::Operator::make_bin("<", binary(|a, b| as_number(a < b), 2)),
+            exmex::Operator::make_bin("<=", binary(|a, b| as_number(a <= b), 2)),
+            exmex::Operator::make_bin(">", binary(|a, b| as_number(a > b), 2)),
+            exmex::Operator::make_bin(">=", binary(|a, b| as_number(a >= b), 2)),
+            exmex::Operator::make_bin("&&", binary(|a, b| as_number(a != 0.0 && b != 0.0), 1)),
+            exmex::Operator::make_bin("||", binary(|a, b| as_number(a != 0.0 || b != 0.0), 0)),
         ]);
         operators
+    }
+}
+
+/// An arithmetic operator that binds tighter than comparisons and conditions.
+fn raised(operator: exmex::Operator<'_, f64>) -> exmex::Operator<'_, f64> {
+    match (operator.bin(), operator.unary()) {
+        (Ok(binary), unary) => {
+            let binary = exmex::BinOp { prio: binary.prio + ARITHMETIC_PRIORITY, ..binary };
+            match unary {
+                Ok(unary) => exmex::Operator::make_bin_unary(operator.repr(), binary, unary),
+                Err(_) => exmex::Operator::make_bin(operator.repr(), binary),
+            }
+        }
+        (Err(_), _) => operator,
     }
 }
 
@@ -145,6 +163,15 @@ mod tests {
         );
         assert!(matches!(Expression::parse("height +", &["height"]), Err(ExpressionError::Syntax { .. })));
         assert!(Expression::parse(&"1+".repeat(300), &[]).is_err());
+    }
+
+    #[test]
+    fn a_sign_before_brackets_holds_for_conditions_too() {
+        for (text, value) in [("-(a > 0)", -1.0), ("-(a > 0 && a < 1)", 0.0), ("2 - (a > 0)", 1.0), ("-(a + 1)", -3.0)]
+        {
+            let e = Expression::parse(text, &["a"]).unwrap();
+            assert_eq!(e.evaluate(&[("a", 2.0)]).unwrap(), value, "{text}");
+        }
     }
 
     #[test]

@@ -10,13 +10,15 @@
 //! | [`solid`], [`expression`], [`template`] | solids, expressions over parameters, the template library |
 //! | [`object`] | grounded parts and objects as perception reports them |
 //! | [`literal`] | state literals and three-valued truth |
-//! | [`camera`], [`plane`], [`embodiment`] | frames and their pixels, calibration, what a real arm takes and reports; the traits of the outside world |
+//! | [`camera`], [`plane`] | frames and their pixels, calibration |
+//! | [`embodiment`], [`arm`] | what a real arm takes and reports, its joints and limits; the traits of the outside world |
 //! | [`primitive`], [`skill`] | the nine primitives, skill invocations and their reports |
 //! | [`expectation`], [`task`] | what memory expects to be seen; what the agent is told of its task |
 //!
 //! Conventions everywhere: metres, radians, seconds, newtons; world frame with z up; camera frames with x
 //! right, y down, z forward.
 
+pub mod arm;
 pub mod camera;
 pub mod color;
 mod convert;

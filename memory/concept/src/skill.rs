@@ -31,12 +31,16 @@ pub struct SkillInvocation {
     pub arguments: BTreeMap<String, f64>,
     /// Where what is held shall stand, for skills that place.
     pub destination: Option<Place>,
-    /// Perceived solids to keep clear of, with the object each belongs to; without the target itself.
+    /// Perceived solids in the world, with the object each belongs to. The target's own are among them, for the links of
+    /// an arm; the hand works at the target and keeps clear of the others.
     pub obstacles: Vec<(ObjectId, PlacedSolid)>,
     /// Perceived height of the surface under the target or destination, world z, metres.
     pub support_height_m: f64,
     /// How what is held sits in the hand: pose of its base frame in the TCP frame, and its part.
     pub held: Option<(ObjectId, Pose, GroundedPart)>,
+    /// The perceived solids of what is held, in its base frame.
+    #[serde(default)]
+    pub held_solids: Vec<PlacedSolid>,
     /// 0 for the first try; each retry takes other parameters (another grasp heading, a deeper press).
     pub attempt: u32,
 }

@@ -14,6 +14,15 @@ pub struct Budgets {
     pub frames: u32,
 }
 
+/// An instruction that follows when the one before it is done.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Further {
+    /// The instruction in plain language.
+    pub instruction: String,
+    /// How long the agent watches before it is given, seconds.
+    pub after_s: f64,
+}
+
 /// The task as the agent gets it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TaskSpec {
@@ -21,8 +30,11 @@ pub struct TaskSpec {
     pub instruction: String,
     /// When the instruction is given, seconds; until then the agent watches.
     pub instruction_at_s: f64,
-    /// Limits.
+    /// Limits; each instruction has them anew.
     pub budgets: Budgets,
+    /// What is asked for next, each once the one before it is done.
+    #[serde(default)]
+    pub then: Vec<Further>,
     /// Cameras with nominal calibration; the first is the main one.
     pub cameras: Vec<CameraModel>,
 }

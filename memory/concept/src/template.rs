@@ -430,6 +430,19 @@ impl TemplateLibrary {
     pub fn solids_of(&self, part: &crate::object::GroundedPart) -> Option<Vec<PlacedSolid>> {
         self.get(&part.template)?.part_solids(&part.name, &part.values()).ok()
     }
+    /// Extents of all parts' solids together along the axes of the first part's frame, metres; `None` without solids.
+    pub fn extents_of(&self, parts: &[crate::object::GroundedPart]) -> Option<DVec3> {
+        let to_first = parts.first()?.pose.pose.inverse();
+        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for part in parts {
+            for placed in self.solids_of(part).unwrap_or_default() {
+                let pose = to_first * part.pose.pose * placed.pose;
+                let half = PlacedSolid { pose, ..placed }.half_extents();
+                (low, high) = (low.min(pose.translation - half), high.max(pose.translation + half));
+            }
+        }
+        (low.x <= high.x).then(|| high - low)
+    }
     /// All templates in the order of their names.
     pub fn iter(&self) -> impl Iterator<Item = &Template> {
         self.templates.values()

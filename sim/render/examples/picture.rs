@@ -40,6 +40,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         pose: Pose::new(DVec3::new(-0.032, -0.45, 1.35), DQuat::from_mat3(&axes)),
         depth_min_m: 0.1,
         depth_max_m: 4.0,
+        mount: Default::default(),
     };
     let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(1);
     let episode = SensorProfile::named("d435")?.episode(&mut rng);

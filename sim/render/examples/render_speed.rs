@@ -21,6 +21,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             pose: Pose::new(DVec3::new(0.0, -0.3, 0.7), DQuat::from_rotation_x(std::f64::consts::PI + 0.4)),
             depth_min_m: 0.1,
             depth_max_m: 4.0,
+            mount: Default::default(),
         };
         let mut scene = cluttered(cylinders);
         let triangles: usize = scene.instances.iter().map(|instance| instance.mesh.triangle_count()).sum();

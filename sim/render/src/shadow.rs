@@ -108,6 +108,7 @@ mod tests {
             pose: Pose::new(DVec3::Z, DQuat::from_rotation_x(std::f64::consts::PI)),
             depth_min_m: 0.1,
             depth_max_m: 6.0,
+            mount: Default::default(),
         }
     }
 

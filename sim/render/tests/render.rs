@@ -32,7 +32,8 @@ fn render(scene: &Scene, camera: &CameraModel) -> Rendered {
 /// A camera without any symmetry that could hide a mistake, and a width whose rows need padding.
 fn skew_camera(pose: Pose) -> CameraModel {
     let intrinsics = Intrinsics { width: 403, height: 297, fx: 371.0, fy: 415.0, cx: 171.3, cy: 183.8 };
-    CameraModel { name: "skew".into(), intrinsics, pose, depth_min_m: 0.1, depth_max_m: 6.0 }
+    let mount = Default::default();
+    CameraModel { name: "skew".into(), intrinsics, pose, mount, depth_min_m: 0.1, depth_max_m: 6.0 }
 }
 
 /// One metre above the origin, looking down; the image's right is x, its bottom -y.

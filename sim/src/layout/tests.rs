@@ -1,6 +1,6 @@
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 use super::*;
-use crate::Scenario;
+use crate::{Scenario, placed::Placed};
 use std::collections::BTreeSet;
 
 fn layout(scenario: &str, seed: u64) -> (Scenario, Layout) {
@@ -36,7 +36,7 @@ fn jittered_layouts_keep_their_rules() {
         let mats: Vec<&Placed> = layout.objects.iter().filter(|o| o.name.starts_with("mat_")).collect();
         counts.insert(mats.len());
         let cube = layout.objects.iter().find(|object| object.name == "cube").unwrap();
-        perturbed += usize::from(cube.solids[0].bevel_m > 0.0);
+        perturbed += usize::from(cube.links[0].pieces[0].bevel_m > 0.0);
         let middle = layout.places[0].1;
         for (i, mat) in mats.iter().enumerate() {
             for other in &mats[i + 1..] {
@@ -52,8 +52,8 @@ fn jittered_layouts_keep_their_rules() {
                 // Room for a camera that is mounted a little wrong.
                 let (inner, outer) = (glam::DVec2::splat(8.0), glam::DVec2::new(632.0, 472.0));
                 assert!(pixel.cmpgt(inner).all() && pixel.cmplt(outer).all(), "seed {seed}: mat {i} at {pixel}");
-                assert!(corner.cmpge(scenario.world.workspace[0].with_z(0.0)).all());
-                assert!(corner.cmple(scenario.world.workspace[1]).all());
+                assert!(corner.cmpge(scenario.world.robot.description.workspace_min.with_z(0.0)).all());
+                assert!(corner.cmple(scenario.world.robot.description.workspace_max).all());
             }
         }
     }
@@ -99,9 +99,9 @@ fn copies_can_be_made_larger_and_of_another_hue() {
     let made = layout.objects.iter().find(|object| object.name == "made").unwrap();
     let plain = layout.objects.iter().find(|object| object.name == "cube").unwrap();
     assert!((made.size().x - 0.195).abs() < 0.002 && (made.size().y - 0.036).abs() < 1e-9, "{}", made.size());
-    let [r, g, b] = made.solids[0].color;
+    let [r, g, b] = made.color().unwrap();
     assert!(b > r && r == g, "red became blue: {r} {g} {b}");
-    assert!(plain.solids[0].color[0] > plain.solids[0].color[2]);
+    assert!(plain.color().unwrap()[0] > plain.color().unwrap()[2]);
     let wrong = text.replace("scale = [1.5,", "scale = [50.0,");
     let error = Layout::draw(&Scenario::parse("s.toml", &wrong).unwrap().world, 0).unwrap_err();
     assert!(error.to_string().contains("made") && error.to_string().contains("0.1 to 10"), "{error}");

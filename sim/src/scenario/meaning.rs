@@ -1,26 +1,30 @@
 //! Turns the text of a scenario file into its meaning and refuses what makes no sense.
 
+mod fluent;
+
 use super::{
     Scenario, ScenarioError, nearest,
     raw::*,
-    spec::{DeedSpec, PlaceAt, Reference, StageSpec, ViolationSpec},
+    spec::{DeedSpec, LightSpec, PlaceAt, Reference, StageSpec, ViolationSpec},
     *,
 };
 use crate::{
-    gripper,
-    model::ModelLibrary,
+    fluent as state_of,
+    mishap::MishapKind,
+    model::{ModelLibrary, ObjectModel, is_name},
     oracle,
     random::{DrawKind, DrawSpec, StreamKind},
+    robot,
 };
 use acm_concept::{
-    camera::{CameraModel, Intrinsics, MAX_PIXELS},
+    camera::{CameraModel, Intrinsics, MAX_PIXELS, Mount},
     expression::Expression,
     pose::Pose,
     suggest::suggest,
-    task::Budgets,
+    task::{Budgets, Further},
 };
-use acm_render::{Lighting, PointLight, Sun};
 use glam::{DMat3, DQuat, DVec3};
+use std::{path::Path, sync::Arc};
 
 const MAX_ITEMS: usize = 64;
 const MAX_ATTEMPTS: u32 = 100_000;
@@ -30,9 +34,7 @@ pub(super) fn parse(file: &str, text: &str) -> Result<Scenario, ScenarioError> {
     let raw: RawScenario = toml::from_str(text).map_err(|e| wrong(suggest(e.to_string())))?;
     let mut models = ModelLibrary::embedded()?;
     for model in &raw.model {
-        let problem = model.problem().map(|reason| ScenarioError::Model { file: file.into(), reason });
-        problem.map_or(Ok(()), Err)?;
-        models.add(model.clone());
+        models.add(model.meaning().map_err(|reason| ScenarioError::Model { file: file.into(), reason })?);
     }
     Meaning::new(file, &raw, models)?.scenario()
 }
@@ -40,7 +42,8 @@ pub(super) fn parse(file: &str, text: &str) -> Result<Scenario, ScenarioError> {
 struct Meaning<'a> {
     file: &'a str,
     raw: &'a RawScenario,
-    models: ModelLibrary,
+    /// Of every object, in their order.
+    models: Vec<Arc<ObjectModel>>,
     /// Draws of one value.
     scalars: Vec<String>,
     /// Draws of several values.
@@ -48,10 +51,14 @@ struct Meaning<'a> {
 }
 
 impl<'a> Meaning<'a> {
-    fn new(file: &'a str, raw: &'a RawScenario, models: ModelLibrary) -> Result<Self, ScenarioError> {
-        let mut meaning = Meaning { file, raw, models, scalars: Vec::new(), lists: Vec::new() };
+    fn new(file: &'a str, raw: &'a RawScenario, mut library: ModelLibrary) -> Result<Self, ScenarioError> {
+        let mut meaning = Meaning { file, raw, models: Vec::new(), scalars: Vec::new(), lists: Vec::new() };
         meaning.check_sizes()?;
         meaning.check_names()?;
+        for object in &raw.object {
+            let model = meaning.model(object, &mut library)?;
+            meaning.models.push(model);
+        }
         for draw in raw.random.iter().flat_map(|random| &random.draw) {
             let (name, is_list) = draw.name_and_shape();
             if is_list { meaning.lists.push(name.into()) } else { meaning.scalars.push(name.into()) }
@@ -61,7 +68,7 @@ impl<'a> Meaning<'a> {
 
     fn scenario(&self) -> Result<Scenario, ScenarioError> {
         let world = self.world()?;
-        let judge = self.judge(&world)?;
+        let judge = self.judge()?;
         Ok(Scenario {
             name: self.raw.scenario.clone(),
             summary: self.raw.summary.clone(),
@@ -85,6 +92,11 @@ impl<'a> Meaning<'a> {
             ("object", raw.object.len(), 0),
             ("place", raw.place.len(), 0),
             ("event", raw.event.len(), 0),
+            ("region", raw.region.len(), 0),
+            ("fluent", raw.fluent.len(), 0),
+            ("rule", raw.rule.len(), 0),
+            ("fault", raw.fault.len(), 0),
+            ("task.then", raw.task.then.len(), 0),
             ("model", raw.model.len(), 0),
             ("random.draw", random.map_or(0, |r| r.draw.len()), 0),
             ("random.reject", random.map_or(0, |r| r.reject.len()), 0),
@@ -103,14 +115,19 @@ impl<'a> Meaning<'a> {
         let draws = raw.random.iter().flat_map(|r| r.draw.iter().map(|draw| draw.name_and_shape().0));
         let objects = raw.object.iter().map(|object| object.name.as_str());
         let places = raw.place.iter().map(|place| place.name.as_str());
+        let regions = raw.region.iter().map(|region| region.name.as_str());
+        let fluents = raw.fluent.iter().map(|fluent| fluent.name.as_str());
         let mut seen: Vec<&str> = vec!["i", "n", "e"];
-        for name in draws.chain(objects).chain(places) {
+        for name in draws.chain(objects).chain(places).chain(regions).chain(fluents) {
             if !is_name(name) {
                 let reason = "a name needs a lower-case letter first, then lower-case letters, digits, underscores";
                 return Err(self.wrong(format!("name `{name}`"), reason));
             }
             if seen.contains(&name) {
-                return Err(self.wrong(format!("name `{name}`"), "is taken; give every draw, object and place its own"));
+                return Err(self.wrong(
+                    format!("name `{name}`"),
+                    "is taken; give every draw, object, place, region and fluent its own",
+                ));
             }
             seen.push(name);
         }
@@ -134,7 +151,16 @@ impl<'a> Meaning<'a> {
             instruction: raw.instruction.clone(),
             instruction_at_s: raw.instruction_at_s,
             budgets: Budgets { seconds: budgets.seconds, skills: budgets.skills, frames: budgets.frames },
+            then: raw.then.iter().map(|then| self.then(then)).collect::<Result<_, _>>()?,
         })
+    }
+
+    fn then(&self, raw: &RawThen) -> Result<Further, ScenarioError> {
+        self.within("task.then.after_s", raw.after_s, 0.0, 3600.0)?;
+        if raw.instruction.trim().is_empty() {
+            return Err(self.wrong("task.then.instruction", "is empty"));
+        }
+        Ok(Further { instruction: raw.instruction.clone(), after_s: raw.after_s })
     }
 
     fn world(&self) -> Result<WorldSpec, ScenarioError> {
@@ -148,17 +174,14 @@ impl<'a> Meaning<'a> {
         if attempts == 0 || attempts > MAX_ATTEMPTS {
             return Err(self.wrong("random.attempts", format!("{attempts} must lie in 1 to {MAX_ATTEMPTS}")));
         }
-        let workspace = raw.robot.workspace.map_or(gripper::WORKSPACE, |[low, high]| [low.into(), high.into()]);
-        let home = raw.robot.home.map_or(gripper::HOME, DVec3::from);
-        if !(home.cmpge(workspace[0]).all() && home.cmple(workspace[1]).all()) {
-            return Err(self.wrong("robot.home", format!("{home} lies outside of the workspace")));
-        }
+        let workspace = raw.robot.workspace.map(|[low, high]| [low.into(), high.into()]);
+        let robot = robot::open(&raw.robot.model, raw.robot.home.map(DVec3::from), workspace)
+            .map_err(|error| self.wrong("robot", error.to_string()))?;
         Ok(WorldSpec {
             surfaces: raw.surface.iter().map(|s| self.surface(s)).collect::<Result<_, _>>()?,
-            lighting: raw.light.as_ref().map_or_else(Lighting::default, lighting),
+            lighting: raw.light.as_ref().map(|light| self.light(light)).transpose()?,
             cameras: raw.camera.iter().map(|c| self.camera(c)).collect::<Result<_, _>>()?,
-            home,
-            workspace,
+            robot,
             stream: random.map_or(StreamKind::Chacha8, |r| r.stream),
             attempts,
             rejects: random.iter().flat_map(|r| &r.reject).map(|r| self.reject(r, &draws)).collect::<Result<_, _>>()?,
@@ -166,7 +189,32 @@ impl<'a> Meaning<'a> {
             objects: (0..raw.object.len()).map(|at| self.object(at)).collect::<Result<_, _>>()?,
             places: raw.place.iter().map(|p| self.place(p)).collect::<Result<_, _>>()?,
             events: raw.event.iter().map(|e| self.event(e)).collect::<Result<_, _>>()?,
+            regions: raw.region.iter().map(|r| self.region(r)).collect::<Result<_, _>>()?,
+            fluents: raw.fluent.iter().map(|f| self.fluent(f)).collect::<Result<_, _>>()?,
+            rules: raw.rule.iter().map(|r| self.rule(r)).collect::<Result<_, _>>()?,
+            mishaps: self.mishaps()?,
         })
+    }
+
+    fn light(&self, raw: &RawLight) -> Result<LightSpec, ScenarioError> {
+        let names = self.plain_names();
+        let number = |number: &Number| self.number("light", number, &names);
+        let triple = |numbers: &[Number; 3]| self.triple("light", numbers, &names);
+        let point = |raw: &RawPointLight| Ok((triple(&raw.position)?, number(&raw.intensity)?));
+        Ok(LightSpec {
+            ambient: number(&raw.ambient)?,
+            sun_direction: triple(&raw.sun_direction)?,
+            sun: number(&raw.sun)?,
+            points: raw.point.iter().map(point).collect::<Result<_, ScenarioError>>()?,
+        })
+    }
+
+    fn mishaps(&self) -> Result<Vec<(MishapKind, u32)>, ScenarioError> {
+        let mishap = |raw: &RawFault| match raw.at_carry {
+            0 => Err(self.wrong("fault.at_carry", "carries are counted from 1")),
+            carry => Ok((raw.kind, carry)),
+        };
+        self.raw.fault.iter().map(mishap).collect()
     }
 
     fn surface(&self, raw: &RawSurface) -> Result<SurfaceSpec, ScenarioError> {
@@ -204,8 +252,13 @@ impl<'a> Meaning<'a> {
             pose: Pose::new(raw.position.into(), rotation),
             depth_min_m: raw.depth_min_m,
             depth_max_m: raw.depth_max_m,
+            mount: match raw.mount {
+                RawMount::World => Mount::World,
+                RawMount::Hand => Mount::Hand,
+            },
         };
-        Ok(CameraSpec { model, sensor: raw.sensor.clone() })
+        let exposure = self.number(&format!("{field}.exposure"), &raw.exposure, &self.plain_names())?;
+        Ok(CameraSpec { model, sensor: raw.sensor.clone(), exposure })
     }
 
     fn draw(&self, at: usize, raw: &RawDraw) -> Result<DrawSpec, ScenarioError> {
@@ -279,11 +332,7 @@ impl<'a> Meaning<'a> {
     fn object(&self, at: usize) -> Result<ObjectSpec, ScenarioError> {
         let raw = &self.raw.object[at];
         let field = format!("object `{}`", raw.name);
-        let model = self.models.get(&raw.model).ok_or_else(|| {
-            let known = self.models.names().collect::<Vec<_>>().join(", ");
-            let hint = nearest(&raw.model, self.models.names());
-            self.wrong(&field, format!("there is no object model `{}`{hint}; known: {known}", raw.model))
-        })?;
+        let model = &self.models[at];
         let mut names = self.plain_names();
         if raw.count.is_some() {
             names.extend(self.lists.iter().map(String::as_str));
@@ -307,6 +356,9 @@ impl<'a> Meaning<'a> {
         Ok(ObjectSpec {
             name: raw.name.clone(),
             model: model.clone(),
+            fixed: raw.fixed.unwrap_or(model.fixed),
+            starts: self.starts(&field, raw, model, &names)?,
+            shows: self.shows(&field, raw, model)?,
             count: raw.count.as_ref().map(|count| self.number(&field, count, &self.plain_names())).transpose()?,
             position: self.triple(&field, raw.position.as_ref().unwrap_or(&origin), &names)?,
             yaw: self.number(&field, raw.yaw.as_ref().unwrap_or(&Number::Plain(0.0)), &names)?,
@@ -317,6 +369,59 @@ impl<'a> Meaning<'a> {
             friction: raw.friction.as_ref().map(|mu| self.number(&field, mu, &names)).transpose()?,
             perturb: raw.perturb,
         })
+    }
+
+    fn model(&self, raw: &RawObject, library: &mut ModelLibrary) -> Result<Arc<ObjectModel>, ScenarioError> {
+        let field = format!("object `{}`", raw.name);
+        match (&raw.model, &raw.model_file) {
+            (Some(name), None) => library.get(name).cloned().ok_or_else(|| {
+                let known = library.names().collect::<Vec<_>>().join(", ");
+                let hint = nearest(name, library.names());
+                self.wrong(&field, format!("there is no object model `{name}`{hint}; known: {known}"))
+            }),
+            (None, Some(file)) => {
+                let folder = Path::new(self.file).parent().unwrap_or(Path::new(""));
+                library.load(file, folder).map_err(|reason| self.wrong(format!("{field}.model_file"), reason))
+            }
+            _ => Err(self.wrong(field, "needs either `model` or `model_file`")),
+        }
+    }
+
+    fn starts(
+        &self,
+        field: &str,
+        raw: &RawObject,
+        model: &ObjectModel,
+        names: &[&str],
+    ) -> Result<Vec<(usize, Expression)>, ScenarioError> {
+        let known = || model.joints().map(|(link, _)| model.links[link].name.as_str());
+        let start = |(name, number): (&String, &Number)| {
+            let found = model.joints().find(|(link, _)| model.links[*link].name == *name);
+            let Some((link, _)) = found else {
+                let reason = format!("there is no joint `{name}`{}", nearest(name, known()));
+                return Err(self.wrong(format!("{field}.joints"), reason));
+            };
+            Ok((link, self.number(&format!("{field}.joints.{name}"), number, names)?))
+        };
+        raw.joints.iter().map(start).collect()
+    }
+
+    fn shows(
+        &self,
+        field: &str,
+        raw: &RawObject,
+        model: &ObjectModel,
+    ) -> Result<Vec<(String, Expression)>, ScenarioError> {
+        let known = self.variables();
+        let shown = |(name, text): (&String, &String)| {
+            if !model.shows().any(|(known, _)| known == name) {
+                let hint = nearest(name, model.shows().map(|(known, _)| known));
+                return Err(self.wrong(format!("{field}.shows"), format!("there is no lamp or gauge `{name}`{hint}")));
+            }
+            let expression = self.expression(&format!("{field}.shows.{name}"), text, &as_strs(&known))?;
+            Ok((name.clone(), expression))
+        };
+        raw.shows.iter().map(shown).collect()
     }
 
     fn place(&self, raw: &RawPlace) -> Result<PlaceSpec, ScenarioError> {
@@ -335,9 +440,7 @@ impl<'a> Meaning<'a> {
         self.within(&format!("{field}.after_s"), raw.after_s, 0.0, 7200.0)?;
         self.within(&format!("{field}.over_s"), raw.over_s, 0.02, 600.0)?;
         self.within(&format!("{field}.lift_m"), raw.lift_m, 0.0, 2.0)?;
-        let others = self.others();
-        let objects = self.raw.object.iter().map(|object| self.visible_to_judge(object));
-        let known = oracle::names(objects, &others);
+        let (others, known) = (self.others(), self.variables());
         let when = raw.when.as_ref().map(|text| self.expression(&field, text, &as_strs(&known))).transpose()?;
         let others = as_strs(&others);
         Ok(EventSpec {
@@ -350,34 +453,43 @@ impl<'a> Meaning<'a> {
     }
 
     fn deed(&self, field: &str, raw: &RawEvent, names: &[&str]) -> Result<DeedSpec, ScenarioError> {
-        match (&raw.carry, &raw.to, raw.cover.as_slice()) {
-            (Some(carry), Some(to), []) => Ok(DeedSpec::Carry {
+        match (&raw.carry, &raw.to, raw.cover.as_slice(), raw.freeze.as_slice()) {
+            (Some(carry), Some(to), [], []) => Ok(DeedSpec::Carry {
                 object: self.reference(field, carry)?,
                 to: self.triple(field, to, names)?,
                 yaw: self.number(field, raw.yaw.as_ref().unwrap_or(&Number::Plain(0.0)), names)?,
                 lift_m: raw.lift_m,
             }),
-            (None, None, cover @ [_, ..]) => {
-                let known = || self.raw.camera.iter().map(|camera| camera.name.as_str());
-                let camera = |name: &String| {
-                    known().position(|camera| camera == name).ok_or_else(|| {
-                        self.wrong(field, format!("there is no camera `{name}`{}", nearest(name, known())))
-                    })
-                };
-                Ok(DeedSpec::Cover { cameras: cover.iter().map(camera).collect::<Result<_, _>>()? })
-            }
-            _ => Err(self.wrong(field, "needs either `carry` and `to`, or `cover`")),
+            (None, None, cover @ [_, ..], []) => Ok(DeedSpec::Cover { cameras: self.cameras(field, cover)? }),
+            (None, None, [], freeze @ [_, ..]) => Ok(DeedSpec::Freeze { cameras: self.cameras(field, freeze)? }),
+            _ => Err(self.wrong(field, "needs either `carry` and `to`, or `cover`, or `freeze`")),
         }
     }
 
-    fn judge(&self, world: &WorldSpec) -> Result<JudgeSpec, ScenarioError> {
+    /// Indices of named cameras.
+    fn cameras(&self, field: &str, names: &[String]) -> Result<Vec<usize>, ScenarioError> {
+        let known = || self.raw.camera.iter().map(|camera| camera.name.as_str());
+        let camera = |name: &String| {
+            known()
+                .position(|camera| camera == name)
+                .ok_or_else(|| self.wrong(field, format!("there is no camera `{name}`{}", nearest(name, known()))))
+        };
+        names.iter().map(camera).collect()
+    }
+
+    fn judge(&self) -> Result<JudgeSpec, ScenarioError> {
         let raw = &self.raw.judge;
         for name in &raw.moves {
             self.known_object("judge.moves", name)?;
         }
-        let objects =
-            world.objects.iter().map(|o| (o.count.is_none().then_some(o.name.as_str()), o.model.button.is_some()));
-        let known = oracle::names(objects, &self.others());
+        // A draw may be called as an object's variable is and then hides it; two objects' variables may not.
+        let of_objects = self.names_with(&[]);
+        if let Some(twice) = of_objects.iter().enumerate().find(|(at, name)| of_objects[..*at].contains(name)) {
+            return Err(
+                self.wrong(format!("name `{}`", twice.1), "stands for two things; rename the object or the joint")
+            );
+        }
+        let known = self.variables();
         let known = as_strs(&known);
         Ok(JudgeSpec {
             moves: raw.moves.clone(),
@@ -426,10 +538,20 @@ impl<'a> Meaning<'a> {
         let index = raw.index.as_ref().map(|index| self.number(field, index, &self.plain_names())).transpose()?;
         Ok(Reference { object, index })
     }
-    /// An object's name if it has no copies, and whether it has a button.
-    fn visible_to_judge(&self, object: &'a RawObject) -> (Option<&'a str>, bool) {
-        let button = self.models.get(&object.model).is_some_and(|model| model.button.is_some());
-        (object.count.is_none().then_some(object.name.as_str()), button)
+    /// Names of objects' variables and of some others.
+    fn names_with(&self, others: &[String]) -> Vec<String> {
+        let named = |object: &'a RawObject| object.count.is_none().then_some(object.name.as_str());
+        let objects = self.raw.object.iter().zip(&self.models).map(|(object, model)| (named(object), &**model));
+        oracle::names(objects, others)
+    }
+    /// All variables of the judge, of events and of rules.
+    fn variables(&self) -> Vec<String> {
+        let mut names = self.names_with(&self.others());
+        let single: Vec<&str> =
+            self.raw.object.iter().filter(|o| o.count.is_none()).map(|object| object.name.as_str()).collect();
+        let regions = self.raw.region.iter().map(|region| region.name.as_str());
+        names.extend(state_of::names(regions, self.raw.fluent.iter().map(|fluent| fluent.name.as_str()), &single));
+        names
     }
     /// Constants that the judge can name: places and plain draws.
     fn others(&self) -> Vec<String> {
@@ -480,22 +602,6 @@ impl RawDraw {
     }
 }
 
-fn is_name(name: &str) -> bool {
-    name.starts_with(|c: char| c.is_ascii_lowercase())
-        && name.len() <= 40
-        && name.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_')
-}
-
 fn as_strs(names: &[String]) -> Vec<&str> {
     names.iter().map(String::as_str).collect()
-}
-
-fn lighting(raw: &RawLight) -> Lighting {
-    let usual = Lighting::default();
-    let point = |raw: &RawPointLight| PointLight { position: raw.position.into(), intensity: raw.intensity };
-    Lighting {
-        ambient: raw.ambient,
-        sun: Sun { direction: raw.sun_direction.into(), intensity: raw.sun, ..usual.sun },
-        points: raw.point.iter().map(point).collect(),
-    }
 }

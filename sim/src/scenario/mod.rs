@@ -3,9 +3,11 @@
 
 mod meaning;
 mod raw;
+mod setting;
 mod spec;
 
 pub(crate) use raw::{Color, RawPerturb};
+pub use setting::Setting;
 pub(crate) use spec::{
     CameraSpec, DeedSpec, EventSpec, JudgeSpec, ObjectSpec, PlaceAt, PlaceSpec, PredicateSpec, Reference, RejectRule,
     RejectSpec, SurfaceSpec, TaskTemplate, WorldSpec,
@@ -114,6 +116,14 @@ impl Scenario {
     /// # Errors
     /// [`ScenarioError::Unknown`] with a suggestion and the list of names, or whatever is wrong with the file.
     pub fn open(name_or_path: &str) -> Result<Scenario, ScenarioError> {
+        Scenario::open_with(name_or_path, &[])
+    }
+
+    /// As [`Scenario::open`], with some of its fields set otherwise.
+    ///
+    /// # Errors
+    /// As [`Scenario::open`], or a setting that leads nowhere.
+    pub fn open_with(name_or_path: &str, settings: &[Setting]) -> Result<Scenario, ScenarioError> {
         let path = Path::new(name_or_path);
         if path.is_file() {
             let read = |source| ScenarioError::Read { file: name_or_path.into(), source };
@@ -121,11 +131,11 @@ impl Scenario {
             if length > MAX_SCENARIO_BYTES as u64 {
                 return Err(too_large(name_or_path));
             }
-            return Scenario::parse(name_or_path, &std::fs::read_to_string(path).map_err(read)?);
+            return Scenario::parse_with(name_or_path, &std::fs::read_to_string(path).map_err(read)?, settings);
         }
         let file = format!("{name_or_path}.toml");
         match EMBEDDED.get_file(&file).and_then(|file| file.contents_utf8()) {
-            Some(text) => Scenario::parse(&file, text),
+            Some(text) => Scenario::parse_with(&file, text, settings),
             None => Err(unknown(name_or_path)),
         }
     }
@@ -139,6 +149,13 @@ impl Scenario {
             return Err(too_large(file));
         }
         meaning::parse(file, text)
+    }
+
+    fn parse_with(file: &str, text: &str, settings: &[Setting]) -> Result<Scenario, ScenarioError> {
+        if settings.is_empty() {
+            return Scenario::parse(file, text);
+        }
+        Scenario::parse(file, &setting::apply(file, text, settings)?)
     }
 
     /// The JSON Schema of scenario files, every field documented.

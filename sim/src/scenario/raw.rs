@@ -1,9 +1,14 @@
 //! The text of a scenario file, before its meaning is checked. The doc comments are the fields' documentation in
 //! the JSON schema.
 
-use crate::{model::ObjectModel, random::StreamKind};
+mod fluent;
+
+pub(crate) use fluent::{RawFluent, RawRegion, RawRule};
+
+use crate::{mishap::MishapKind, model::RawModel, random::StreamKind};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// A number, or an expression over named draws such as `"0.1 + radius * cos(phase + TAU * i / n)"`.
 ///
@@ -67,7 +72,7 @@ pub(crate) struct RawScenario {
     pub(crate) random: Option<RawRandom>,
     /// Object models of this file alone, besides those that ship with the simulator.
     #[serde(default)]
-    pub(crate) model: Vec<ObjectModel>,
+    pub(crate) model: Vec<RawModel>,
     /// The objects.
     #[serde(default)]
     pub(crate) object: Vec<RawObject>,
@@ -77,6 +82,18 @@ pub(crate) struct RawScenario {
     /// What third parties do.
     #[serde(default)]
     pub(crate) event: Vec<RawEvent>,
+    /// Boxes in space of which is known what is in them.
+    #[serde(default)]
+    pub(crate) region: Vec<RawRegion>,
+    /// Quantities that are not poses: temperatures, counters, timers.
+    #[serde(default)]
+    pub(crate) fluent: Vec<RawFluent>,
+    /// What changes fluents.
+    #[serde(default)]
+    pub(crate) rule: Vec<RawRule>,
+    /// What goes wrong in every episode.
+    #[serde(default)]
+    pub(crate) fault: Vec<RawFault>,
     /// How the outcome is judged. Never shown to the agent.
     pub(crate) judge: RawJudge,
 }
@@ -95,6 +112,20 @@ pub(crate) struct RawTask {
     pub(crate) instruction_at_s: f64,
     /// Limits of the episode.
     pub(crate) budgets: RawBudgets,
+    /// Instructions that are given in the same run, each after the agent is done with the one before.
+    #[serde(default)]
+    pub(crate) then: Vec<RawThen>,
+}
+
+/// A further instruction. It is given once the agent is done with the one before it, and has the task's budgets anew.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct RawThen {
+    /// The instruction in plain language.
+    pub(crate) instruction: String,
+    /// How long the agent watches before it is given, seconds. Default: 0.
+    #[serde(default)]
+    pub(crate) after_s: f64,
 }
 
 /// Limits of the episode.
@@ -133,12 +164,12 @@ pub(crate) struct RawSurface {
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct RawLight {
-    /// Light that reaches every surface alike, 0-1.
-    pub(crate) ambient: f32,
+    /// Light that reaches every surface alike, 0-1. This and the other numbers of lights can use plain draws.
+    pub(crate) ambient: Number,
     /// Direction in which the sun's light travels.
-    pub(crate) sun_direction: [f64; 3],
+    pub(crate) sun_direction: [Number; 3],
     /// Strength of the sun.
-    pub(crate) sun: f32,
+    pub(crate) sun: Number,
     /// Lights at points, without shadows.
     #[serde(default)]
     pub(crate) point: Vec<RawPointLight>,
@@ -149,18 +180,18 @@ pub(crate) struct RawLight {
 #[serde(deny_unknown_fields)]
 pub(crate) struct RawPointLight {
     /// Where, metres.
-    pub(crate) position: [f64; 3],
+    pub(crate) position: [Number; 3],
     /// Strength at 1 m.
-    pub(crate) intensity: f32,
+    pub(crate) intensity: Number,
 }
 
-/// An RGB-D camera that stands still.
+/// An RGB-D camera.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct RawCamera {
     /// Name.
     pub(crate) name: String,
-    /// Where it is, metres.
+    /// Where it is, metres; on the hand, in the frame of the tool centre point.
     pub(crate) position: [f64; 3],
     /// Direction of view. Need not have unit length.
     pub(crate) forward: [f64; 3],
@@ -183,18 +214,43 @@ pub(crate) struct RawCamera {
     /// Name of the sensor profile. Default: `d435`, with per-episode bias.
     #[serde(default = "d435")]
     pub(crate) sensor: String,
+    /// What carries it: `world`, where it stands still, or `hand`. Default: `world`.
+    #[serde(default)]
+    pub(crate) mount: RawMount,
+    /// Factor by which its colours are too bright; can use plain draws. Default: 1.
+    #[serde(default = "one")]
+    pub(crate) exposure: Number,
 }
 
-/// The robot: a two-finger hand that floats on a wrist of limited force.
-#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+/// What carries a camera.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum RawMount {
+    /// It stands still.
+    #[default]
+    World,
+    /// It moves with the hand.
+    Hand,
+}
+
+/// The robot that has the task.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
 pub(crate) struct RawRobot {
-    /// Where the tool centre point waits, metres; the hand looks down. Default: above the back of the table.
-    #[serde(default)]
+    /// Its model: `floating-gripper` (a two-finger hand on a wrist of limited force), `floating-suction` (the same with a
+    /// suction cup), `panda`, `panda-suction` (a 7-joint arm with either), `dual-panda` (two arms with a hand each).
+    pub(crate) model: String,
+    /// Where the tool centre point of a hand without an arm waits, metres; the hand looks down. Default: above the back of
+    /// the table. An arm waits where its model says.
     pub(crate) home: Option<[f64; 3]>,
-    /// Corners of the workspace box, smallest and largest coordinates, metres.
-    #[serde(default)]
+    /// Corners of the workspace box, smallest and largest coordinates, metres. Default: the model's.
     pub(crate) workspace: Option<[[f64; 3]; 2]>,
+}
+
+impl Default for RawRobot {
+    fn default() -> Self {
+        RawRobot { model: "floating-gripper".into(), home: None, workspace: None }
+    }
 }
 
 /// What is random.
@@ -299,8 +355,13 @@ pub(crate) struct RawReject {
 pub(crate) struct RawObject {
     /// Name: lower-case letters, digits and underscores, a letter first.
     pub(crate) name: String,
-    /// Name of its model.
-    pub(crate) model: String,
+    /// Its model: one that ships with the simulator, or one of this file. Either this or `model_file`.
+    #[serde(default)]
+    pub(crate) model: Option<String>,
+    /// A URDF or MJCF file instead: a path relative to this file, or `data:` and a path below the folder that the
+    /// variable `ACM_DATA` names. `#BODY` after an MJCF file takes one of its bodies.
+    #[serde(default)]
+    pub(crate) model_file: Option<String>,
     /// How many copies. In a copy's expressions `i` is its number from 0, `n` the count, and the name of a list of
     /// draws stands for the list's value at `i`.
     #[serde(default)]
@@ -317,6 +378,15 @@ pub(crate) struct RawObject {
     /// Factors by which sizes and places of its solids are stretched along its axes; angles stay. Default: 1.
     #[serde(default)]
     pub(crate) scale: Option<[Number; 3]>,
+    /// Positions of its joints at the start, by name, radians or metres. Default: the model's.
+    #[serde(default)]
+    pub(crate) joints: BTreeMap<String, Number>,
+    /// What its lamps and gauges show, by name: expressions over the judge's variables. Default: the model's.
+    #[serde(default)]
+    pub(crate) shows: BTreeMap<String, String>,
+    /// Whether its base stands still whatever touches it. Default: the model's.
+    #[serde(default)]
+    pub(crate) fixed: Option<bool>,
     /// Hue of its colours, degrees (0 red, 120 green, 240 blue), their saturation and brightness kept. Default: the
     /// model's own.
     #[serde(default)]
@@ -375,7 +445,7 @@ pub(crate) struct RawPlace {
     pub(crate) position: Option<[Number; 3]>,
 }
 
-/// A third party carries an object from where it is to another place, or covers cameras for a while.
+/// A third party carries an object from where it is to another place, or covers or freezes cameras for a while.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct RawEvent {
@@ -394,6 +464,9 @@ pub(crate) struct RawEvent {
     /// meanwhile is not seen.
     #[serde(default)]
     pub(crate) cover: Vec<String>,
+    /// Names of the cameras that stop instead: for as long as it takes they go on delivering their last picture.
+    #[serde(default)]
+    pub(crate) freeze: Vec<String>,
     /// Where the base frame of what is carried comes to stand, metres. Expressions can use places and plain draws.
     #[serde(default)]
     pub(crate) to: Option<[Number; 3]>,
@@ -408,12 +481,27 @@ pub(crate) struct RawEvent {
     pub(crate) lift_m: f64,
 }
 
+/// Something that goes wrong with what the hand carries.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct RawFault {
+    /// What goes wrong.
+    pub(crate) kind: MishapKind,
+    /// During which carry, counted from 1. Default: 1.
+    #[serde(default = "first")]
+    pub(crate) at_carry: u32,
+}
+
 /// How the outcome is judged, over the world's true state after every physics step.
 ///
 /// Variables: for every object without `count`: `NAME_x`, `NAME_y`, `NAME_z` (base frame, metres), `NAME_speed`
 /// (m/s), `NAME_spin` (rad/s), `NAME_tilt` (rad from upright), `NAME_moved` (metres from its start), `NAME_turned`
-/// (rad from its first heading), `NAME_touched` (pads in contact with it); for buttons `NAME_pressed` (1 or 0), `NAME_presses` (count), `NAME_depth` (metres);
-/// `PLACE_x`, `PLACE_y`, `PLACE_z`; `others_moved` (metres, the most that any object not listed in `moves` has
+/// (rad from its first heading), `NAME_touched` (pads in contact with it); for each of its joints `NAME_JOINT`
+/// (position, rad or m), `NAME_JOINT_speed`, `NAME_JOINT_open` (0 closed to 1 wide open; 0 for one that turns without
+/// end), with a latch `NAME_JOINT_latched` (1 or 0), with a press counter `NAME_JOINT_pressed` (1 or 0) and
+/// `NAME_JOINT_presses` (count); of its first press counter also `NAME_pressed`, `NAME_presses`, `NAME_depth`;
+/// `PLACE_x`, `PLACE_y`, `PLACE_z`; `REGION_has_NAME`, `REGION_count`; fluents under their names; `others_moved`
+/// (metres, the most that any object not listed in `moves` has
 /// moved); `commanded_opening` (share of the largest), `pad_contact` (pads in contact with anything, 0-2), `tcp_x`,
 /// `tcp_y`, `tcp_z`, `time` (seconds); plain draws under their names.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
@@ -511,4 +599,7 @@ fn one_f64() -> f64 {
 }
 fn lift() -> f64 {
     0.1
+}
+fn first() -> u32 {
+    1
 }

@@ -2,21 +2,27 @@
 
 use super::raw::{Color, RawPerturb};
 use crate::{
+    mishap::MishapKind,
     model::ObjectModel,
     random::{DrawSpec, StreamKind},
+    robot::RobotModel,
 };
-use acm_concept::{camera::CameraModel, expression::Expression, task::Budgets};
-use acm_render::Lighting;
+use acm_concept::{
+    camera::CameraModel,
+    expression::Expression,
+    task::{Budgets, Further},
+};
 use glam::DVec3;
+use std::sync::Arc;
 
 /// What the simulator builds.
 #[derive(Debug, Clone)]
 pub(crate) struct WorldSpec {
     pub(crate) surfaces: Vec<SurfaceSpec>,
-    pub(crate) lighting: Lighting,
+    /// `None` for the usual lights.
+    pub(crate) lighting: Option<LightSpec>,
     pub(crate) cameras: Vec<CameraSpec>,
-    pub(crate) home: DVec3,
-    pub(crate) workspace: [DVec3; 2],
+    pub(crate) robot: RobotModel,
     pub(crate) stream: StreamKind,
     pub(crate) attempts: u32,
     pub(crate) draws: Vec<DrawSpec>,
@@ -24,6 +30,44 @@ pub(crate) struct WorldSpec {
     pub(crate) objects: Vec<ObjectSpec>,
     pub(crate) places: Vec<PlaceSpec>,
     pub(crate) events: Vec<EventSpec>,
+    pub(crate) regions: Vec<RegionSpec>,
+    pub(crate) fluents: Vec<FluentSpec>,
+    pub(crate) rules: Vec<RuleSpec>,
+    pub(crate) mishaps: Vec<(MishapKind, u32)>,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct LightSpec {
+    pub(crate) ambient: Expression,
+    pub(crate) sun_direction: [Expression; 3],
+    pub(crate) sun: Expression,
+    /// Position and strength.
+    pub(crate) points: Vec<([Expression; 3], Expression)>,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct RegionSpec {
+    pub(crate) name: String,
+    pub(crate) of: Option<Reference>,
+    pub(crate) low: [Expression; 3],
+    pub(crate) high: [Expression; 3],
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct FluentSpec {
+    pub(crate) name: String,
+    pub(crate) start: Expression,
+    /// Over all variables, per second.
+    pub(crate) rate: Option<Expression>,
+    pub(crate) low: f64,
+    pub(crate) high: f64,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct RuleSpec {
+    pub(crate) when: Expression,
+    /// Index of the fluent and its new value.
+    pub(crate) set: Vec<(usize, Expression)>,
 }
 
 #[derive(Debug, Clone)]
@@ -41,6 +85,7 @@ pub(crate) struct CameraSpec {
     /// Nominal calibration.
     pub(crate) model: CameraModel,
     pub(crate) sensor: String,
+    pub(crate) exposure: Expression,
 }
 
 #[derive(Debug, Clone)]
@@ -60,7 +105,12 @@ pub(crate) enum RejectRule {
 #[derive(Debug, Clone)]
 pub(crate) struct ObjectSpec {
     pub(crate) name: String,
-    pub(crate) model: ObjectModel,
+    pub(crate) model: Arc<ObjectModel>,
+    pub(crate) fixed: bool,
+    /// Links, and where their joints start.
+    pub(crate) starts: Vec<(usize, Expression)>,
+    /// Lamps and gauges, and what they show instead of what the model says.
+    pub(crate) shows: Vec<(String, Expression)>,
     pub(crate) count: Option<Expression>,
     pub(crate) position: [Expression; 3],
     pub(crate) yaw: Expression,
@@ -114,6 +164,10 @@ pub(crate) enum DeedSpec {
     Cover {
         cameras: Vec<usize>,
     },
+    /// Indices of the cameras.
+    Freeze {
+        cameras: Vec<usize>,
+    },
 }
 
 /// What the judge decides.
@@ -152,4 +206,5 @@ pub(crate) struct TaskTemplate {
     pub(crate) instruction: String,
     pub(crate) instruction_at_s: f64,
     pub(crate) budgets: Budgets,
+    pub(crate) then: Vec<Further>,
 }

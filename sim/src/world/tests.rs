@@ -77,8 +77,8 @@ fn a_camera_is_covered_for_as_long_as_the_event_lasts() {
 #[test]
 fn commands_beyond_the_limits_are_refused_and_move_nothing() {
     let mut world = World::new(&Scenario::open("put-back-block").unwrap(), &SimOptions::default()).unwrap();
-    let home = world.robot.home;
-    let good = Command { tcp: home, opening_m: OPEN_M, grip_force_n: 10.0 };
+    let home = world.robot.description.home;
+    let good = Command::hand(home, OPEN_M, 10.0);
     let near = |shift| Pose { translation: home.translation + shift, ..home };
     let bad = [
         Command { tcp: near(DVec3::X * 0.02), ..good },
@@ -107,7 +107,7 @@ fn commands_beyond_the_limits_are_refused_and_move_nothing() {
 fn with_motion_off_nothing_can_be_commanded() {
     let options = SimOptions { motion: false, ..SimOptions::default() };
     let mut world = World::new(&Scenario::open("put-back-block").unwrap(), &options).unwrap();
-    let command = Command { tcp: world.robot.home, opening_m: OPEN_M, grip_force_n: 10.0 };
+    let command = Command::hand(world.robot.description.home, OPEN_M, 10.0);
     assert_eq!(world.command(&command).unwrap_err(), EmbodimentError::MotionDisabled);
     assert_eq!(world.wait_until(Time::from_seconds(0.5)).unwrap(), Time::from_seconds(0.5));
 }
@@ -115,10 +115,10 @@ fn with_motion_off_nothing_can_be_commanded() {
 #[test]
 fn the_hand_goes_where_it_is_told() {
     let mut world = World::new(&Scenario::open("put-back-block").unwrap(), &SimOptions::default()).unwrap();
-    let home = world.robot.home.translation;
+    let home = world.robot.description.home.translation;
     for tick in 1..=50 {
         let tcp = down(home + DVec3::new(0.0, 0.0, -0.008 * f64::from(tick).min(40.0)), 0.0);
-        world.command(&Command { tcp, opening_m: 0.05, grip_force_n: 10.0 }).unwrap();
+        world.command(&Command::hand(tcp, 0.05, 10.0)).unwrap();
     }
     let feedback = world.feedback();
     assert!(feedback.tcp.translation.distance(home - DVec3::Z * 0.32) < 5e-4, "{feedback:?}");

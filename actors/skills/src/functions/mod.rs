@@ -3,6 +3,7 @@
 pub(crate) mod grasp_from_above;
 pub(crate) mod place_upright;
 pub(crate) mod press_down;
+pub(crate) mod suck_from_above;
 
 use crate::{
     controller::StartError,

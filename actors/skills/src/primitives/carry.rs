@@ -34,7 +34,7 @@ impl Primitive for Carry {
         Kind::Move
     }
     fn limit_s(&self) -> f64 {
-        self.path.duration_s() + SLACK_S
+        self.path.longest_s() + SLACK_S
     }
     fn tick(&mut self, hand: &mut Hand, feedback: &Feedback) -> Step {
         let grip = self.watch.check(hand, feedback);
@@ -44,8 +44,7 @@ impl Primitive for Carry {
             Ok(Grip::Unsure) => return Step::Act,
             Ok(Grip::Shifted) => self.path.restart(hand.command.tcp),
         }
-        if let Some(next) = self.path.advance() {
-            hand.command.tcp = next;
+        if hand.follow(&mut self.path) {
             return Step::Act;
         }
         if self.rest.tick(hand, feedback) { Step::Done(Outcome::Arrived) } else { Step::Act }

@@ -1,7 +1,7 @@
 //! Whether what was grasped is still in the hand, from the fingers' gap and the pads.
 
 use super::Failure;
-use crate::hand::{CLOSED_M, Hand, pads_in_contact};
+use crate::hand::{CLOSED_M, Hand, SEALED, pads_in_contact};
 use acm_concept::{embodiment::Feedback, skill::FailureCause};
 
 /// A gap that changes by more than this is no longer around the same thing in the same way, metres.
@@ -51,6 +51,9 @@ impl GripWatch {
             let reason = format!("the object was lost on the way: {how} (gap {before:.1} mm before, {now:.1} mm now)");
             Err(Failure::empty_handed(FailureCause::Grasp, reason))
         };
+        if hand.robot.suction.is_some() {
+            return if feedback.vacuum > SEALED { Ok(Grip::Firm) } else { lost("the cup has no vacuum") };
+        }
         if gap_m < CLOSED_M {
             return lost("the fingers closed");
         }

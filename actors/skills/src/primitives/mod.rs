@@ -6,6 +6,7 @@ mod grip;
 mod push;
 mod reach;
 mod release;
+mod suck;
 
 pub(crate) use carry::{Carry, Lower};
 pub(crate) use grasp::{Grasp, GraspPlan};
@@ -13,6 +14,7 @@ pub(crate) use grip::{Grip, GripWatch};
 pub(crate) use push::{Push, PushPlan};
 pub(crate) use reach::Reach;
 pub(crate) use release::Release;
+pub(crate) use suck::Suck;
 
 use crate::hand::Hand;
 use acm_concept::{embodiment::Feedback, pose::Pose, primitive::Primitive as Kind, skill::FailureCause};

@@ -36,15 +36,14 @@ impl Primitive for Reach {
         Kind::Reach
     }
     fn limit_s(&self) -> f64 {
-        self.path.duration_s() + SLACK_S
+        self.path.longest_s() + SLACK_S
     }
     fn tick(&mut self, hand: &mut Hand, feedback: &Feedback) -> Step {
         if let Err(failure) = check_collision(hand, "while reaching") {
             return Step::Failed(failure);
         }
         let commanded = hand.turn_opening(self.opening_m, FINGER_SPEED_M_S);
-        if let Some(next) = self.path.advance() {
-            hand.command.tcp = next;
+        if hand.follow(&mut self.path) {
             return Step::Act;
         }
         let Some(rest) = &mut self.rest else { return Step::Done(Outcome::Arrived) };

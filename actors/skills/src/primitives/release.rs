@@ -1,4 +1,4 @@
-//! Release: open the fingers gently until both pads are free, or have had time to be.
+//! Release: open the fingers gently until both pads are free, or have had time to be; or vent the cup.
 
 use super::{Outcome, Primitive, Step};
 use crate::hand::{Hand, pads_in_contact};
@@ -6,6 +6,8 @@ use acm_concept::{embodiment::Feedback, primitive::Primitive as Kind};
 
 /// Speed of the first opening, m/s.
 const OPENING_M_S: f64 = 0.1;
+/// Below this share of the pump's best vacuum a cup holds nothing.
+const VENTED: f64 = 0.02;
 /// The gap must grow by at least this before free pads count, metres.
 const GROWN_M: f64 = 0.004;
 /// How long the hand waits, open, for what it let go to come to rest, seconds.
@@ -37,6 +39,12 @@ impl Primitive for Release {
         self.opening_m / OPENING_M_S + LEANING_S + REST_S + 1.0
     }
     fn tick(&mut self, hand: &mut Hand, feedback: &Feedback) -> Step {
+        if hand.robot.suction.is_some() {
+            hand.command.vacuum = false;
+            self.free_ticks = if feedback.vacuum < VENTED { self.free_ticks + 1 } else { 0 };
+            let free = self.free_ticks > hand.ticks(REST_S);
+            return if free { Step::Done(Outcome::Released { free: true }) } else { Step::Act };
+        }
         // Opening starts from the gap, not from the closed command that kept the force up.
         hand.command.opening_m = hand.command.opening_m.max(self.gap_m.min(hand.robot.max_opening_m));
         let open = hand.turn_opening(self.opening_m, OPENING_M_S);

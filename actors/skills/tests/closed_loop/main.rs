@@ -54,6 +54,7 @@ fn invocation(kind: &str, base: Pose, frame_height_m: f64, arguments: &[(&str, f
         obstacles: vec![],
         support_height_m: base.translation.z,
         held: None,
+        held_solids: vec![],
         attempt: 0,
     }
 }

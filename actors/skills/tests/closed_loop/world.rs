@@ -96,6 +96,7 @@ pub fn robot() -> RobotDescription {
         max_turn_rad_s: 3.0,
         tick_s: 0.02,
         home: Pose::new(DVec3::new(0.0, 0.25, 1.12), DQuat::from_rotation_x(PI)),
+        ..RobotDescription::default()
     }
 }
 
@@ -115,7 +116,7 @@ impl World {
             peak_n: 0.0,
             armed: true,
             target: robot.home,
-            command: Command { tcp: robot.home, opening_m: robot.max_opening_m, grip_force_n: 20.0 },
+            command: Command::hand(robot.home, robot.max_opening_m, 20.0),
             tcp: robot.home,
             velocity: DVec3::ZERO,
             gap_m: robot.max_opening_m,
@@ -306,6 +307,7 @@ impl Embodiment for World {
             commanded_opening_m: self.command.opening_m,
             pad_force_n: [pad(1.0), second],
             wrist_force_n: self.wrist_n,
+            ..Feedback::default()
         }
     }
     fn command(&mut self, command: &Command) -> Result<Feedback, EmbodimentError> {

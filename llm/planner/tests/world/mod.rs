@@ -444,6 +444,7 @@ pub fn robot() -> RobotDescription {
         max_turn_rad_s: 2.0,
         tick_s: 0.02,
         home: Pose::IDENTITY,
+        ..RobotDescription::default()
     }
 }
 
@@ -458,6 +459,7 @@ pub fn situation(world: &World, looks: u32) -> Situation {
             commanded_opening_m: 0.08,
             pad_force_n: [DVec3::ZERO; 2],
             wrist_force_n: DVec3::ZERO,
+            ..Feedback::default()
         },
         looks,
         deadline: Time::from_seconds(600.0),

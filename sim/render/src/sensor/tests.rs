@@ -12,7 +12,8 @@ const FOCAL_BASELINE: f64 = 384.0 * 0.05;
 
 fn camera() -> CameraModel {
     let intrinsics = Intrinsics { width: WIDTH, height: HEIGHT, fx: 600.0, fy: 600.0, cx: 319.5, cy: 119.5 };
-    CameraModel { name: "head".into(), intrinsics, pose: Pose::IDENTITY, depth_min_m: 0.2, depth_max_m: 5.0 }
+    let mount = Default::default();
+    CameraModel { name: "head".into(), intrinsics, pose: Pose::IDENTITY, mount, depth_min_m: 0.2, depth_max_m: 5.0 }
 }
 
 /// A frame whose depth is a function of column and row.

@@ -1,16 +1,11 @@
-//! An injected mishap: an object is taken out of the hand unseen and set down somewhere near.
+//! Mishaps with what the hand carries: it is gone and stands somewhere near, or the fingers let it fall.
 
-use crate::{
-    body::Body,
-    event::put,
-    layout::{gap, solids_at},
-    snapshot::SavedRng,
-    world::World,
-};
+use crate::{body::Body, event::put, layout::gap, placed::solids_at, snapshot::SavedRng, world::World};
 use acm_concept::{camera::CameraModel, pose::Pose};
 use glam::{DVec2, DVec3};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
@@ -29,9 +24,23 @@ const BORDER: f64 = 30.0 / 640.0;
 /// Places tried in one physics step; the next step tries again from where the hand is then.
 const TRIES: u32 = 64;
 
+/// How long the hand lets go in a drop, seconds.
+const DROP_S: f64 = 0.3;
+
+/// What goes wrong with what the hand carries.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum MishapKind {
+    /// It is taken out of the hand unseen and set down 5 to 12 cm away.
+    Slip,
+    /// The fingers open for 0.3 s, and it falls.
+    Drop,
+}
+
 /// Watches what the hand carries and strikes once, during the given carry.
 #[derive(Debug, Clone)]
-pub(crate) struct Slip {
+pub(crate) struct Mishap {
+    kind: MishapKind,
     /// Counted from 1.
     at_carry: u32,
     rng: ChaCha8Rng,
@@ -39,6 +48,8 @@ pub(crate) struct Slip {
     carries: u32,
     gripped: Option<Gripped>,
     done: bool,
+    /// Until when a drop holds the fingers open, seconds.
+    open_until_s: f64,
 }
 
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
@@ -49,29 +60,32 @@ pub(crate) struct Gripped {
     counted: bool,
 }
 
-/// All that the mishap changes while the world runs.
+/// All that a mishap changes while the world runs.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub(crate) struct SlipState {
+pub(crate) struct MishapState {
     rng: SavedRng,
     carries: u32,
     gripped: Option<Gripped>,
     done: bool,
+    open_until_s: f64,
 }
 
-impl Slip {
-    pub(crate) fn state(&self) -> SlipState {
-        SlipState { rng: SavedRng::of(&self.rng), carries: self.carries, gripped: self.gripped, done: self.done }
+impl Mishap {
+    pub(crate) fn state(&self) -> MishapState {
+        let Mishap { carries, gripped, done, open_until_s, .. } = *self;
+        MishapState { rng: SavedRng::of(&self.rng), carries, gripped, done, open_until_s }
     }
-    pub(crate) fn set_state(&mut self, state: SlipState) {
+    pub(crate) fn set_state(&mut self, state: MishapState) {
         self.rng = state.rng.rng();
-        (self.carries, self.gripped, self.done) = (state.carries, state.gripped, state.done);
+        (self.carries, self.gripped) = (state.carries, state.gripped);
+        (self.done, self.open_until_s) = (state.done, state.open_until_s);
     }
 
-    pub(crate) fn new(at_carry: u32, seed: u64, camera: Option<CameraModel>) -> Slip {
+    pub(crate) fn new(kind: MishapKind, at_carry: u32, seed: u64, camera: Option<CameraModel>) -> Mishap {
         // A stream of its own: the mishap changes nothing else.
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(2);
-        Slip { at_carry, rng, camera, carries: 0, gripped: None, done: false }
+        Mishap { kind, at_carry, rng, camera, carries: 0, gripped: None, done: false, open_until_s: 0.0 }
     }
 
     /// Looks at the world after a physics step.
@@ -100,8 +114,17 @@ impl Slip {
         }
     }
 
+    /// Whether the hand lets go now, whatever it was told.
+    pub(crate) fn drops(&self, world: &World) -> bool {
+        world.seconds() < self.open_until_s
+    }
+
     fn strike(&mut self, world: &mut World) {
         let Some(gripped) = self.gripped else { return };
+        if self.kind == MishapKind::Drop {
+            (self.open_until_s, self.done) = (world.seconds() + DROP_S, true);
+            return;
+        }
         for _ in 0..TRIES {
             let pose = self.candidate(world, &world.bodies[gripped.body]);
             if let Some(pose) = pose.filter(|pose| self.is_free(world, gripped.body, pose)) {
@@ -143,6 +166,6 @@ impl Slip {
             let there = solids_at(&other.placed, &other.pose(&world.physics));
             gap(&here, &there).is_ok_and(|gap| gap >= CLEARANCE_M)
         });
-        seen && clear && world.robot.reaches(centre)
+        seen && clear && world.robot.description.reaches(centre)
     }
 }
