@@ -21,7 +21,7 @@ use acm_concept::{
 };
 use acm_planner::{GiveUpCause, Lexicon};
 use acm_runtime::{envelope::Role, journal::Journal, system::PanicAt};
-use acm_sim::{OracleVerdict, Scenario, SharedRenderer, SimOptions, SimTimings, Simulation};
+use acm_sim::{AuditReport, OracleVerdict, Scenario, SharedRenderer, SimOptions, SimTimings, Simulation};
 use anyhow::Context;
 use serde::Serialize;
 use std::{
@@ -80,6 +80,9 @@ pub struct EpisodeResult {
     pub report: EpisodeReport,
     /// Equal for equal initial worlds.
     pub world: String,
+    /// What the physics audit found; an episode with a violation is void, which the verdict says. Empty where the world
+    /// is not ours.
+    pub audit: AuditReport,
     /// Motion commands that reached the robot.
     pub motion_commands: u64,
     /// Wall time of the whole episode, seconds.
@@ -237,7 +240,9 @@ impl Runner {
         let mut lived = self.live(simulation.task(), outside, world.seed, config, journal, trace)?;
         split_host_time(&mut lived.spent_s, &before, &simulation.timings());
         let judged = !matches!(lived.report.ending, Ending::Until { .. });
-        Ok(lived.result(world.seed, world.digest.clone(), judged.then(|| simulation.verdict()), started))
+        let verdict = judged.then(|| simulation.verdict());
+        let result = lived.result(world.seed, world.digest.clone(), verdict, started);
+        Ok(EpisodeResult { audit: simulation.audit(), ..result })
     }
 
     /// Runs one episode on a robot in another process. The seed is that of the agent's own draws. A host that is lost
@@ -372,6 +377,7 @@ impl Lived {
             verdict,
             report: self.report,
             world,
+            audit: AuditReport::default(),
             motion_commands: self.commands,
             wall_s: started.elapsed().as_secs_f64(),
             spent_s: self.spent_s,

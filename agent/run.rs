@@ -237,7 +237,13 @@ fn print_judgement(result: &EpisodeResult) -> anyhow::Result<()> {
     for violation in &verdict.violations {
         writeln!(out, "          violation: {violation}")?;
     }
+    writeln!(out, "audit     {} violations{}", result.audit.violations, listed(&result.audit.first))?;
     Ok(())
+}
+
+/// What the audit tells in words, a line each.
+fn listed(told: &[String]) -> String {
+    told.iter().map(|what| format!("\n          {what}")).collect()
 }
 
 fn print_summary(runs: &Runs<'_>, asked: usize) -> anyhow::Result<()> {
@@ -256,9 +262,10 @@ fn print_summary(runs: &Runs<'_>, asked: usize) -> anyhow::Result<()> {
     )?;
     writeln!(
         out,
-        "  faithful {}; false successes {}; gave up {}; not finished {}; {} distinct worlds",
+        "  faithful {}; false successes {}; audit violations {}; gave up {}; not finished {}; {} distinct worlds",
         runs.faithful,
         runs.false_successes,
+        runs.audit_violations,
         runs.gave_up,
         asked - runs.episodes.len(),
         runs.distinct_worlds
@@ -321,6 +328,7 @@ struct Runs<'a> {
     solved: usize,
     faithful: usize,
     false_successes: usize,
+    audit_violations: u64,
     gave_up: usize,
     distinct_worlds: usize,
     causes: BTreeMap<&'static str, usize>,
@@ -347,6 +355,7 @@ impl<'a> Runs<'a> {
             solved: count(|e| e.solved),
             faithful: count(|e| e.verdict.faithful == Some(true)),
             false_successes: count(|e| e.false_success),
+            audit_violations: episodes.iter().map(|e| e.audit.violations).sum(),
             gave_up: count(|e| matches!(e.report.ending, Ending::GaveUp { .. })),
             distinct_worlds: episodes.iter().map(|e| &e.world).collect::<BTreeSet<_>>().len(),
             causes,

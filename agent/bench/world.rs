@@ -1,26 +1,64 @@
-//! `acm bench world`: what results in the simulated world rest on.
+//! `acm bench world`: what results in the simulated world rest on, beside MuJoCo where there is one.
 //!
 //! | module | measures |
 //! |---|---|
+//! | [`blocks`] | five cubes grasped, shaken, held and stacked over many seeds: drops, slip, tower |
+//! | [`expert`] | (the script that does it, through the robot's commands alone) |
+//! | [`physics`] | the cost of a physics step beside MuJoCo's |
+//! | [`rendering`] | frames a processor second beside MuJoCo's |
+//! | [`pace`] | an episode's pace when the executor alone works, with and without cameras |
+//! | [`snapshots`] | whether a world that is put back goes on as before |
 //! | [`primitives`] | the nine primitives alone, with exact geometry, over a published table of cases |
 //! | [`articulated`] | doors and drawers opened to three quarters and shut again |
+//! | [`peer`], [`clock`] | (MuJoCo in a process of its own; processor time) |
 //!
 //! A module has one function `measure(args, result)` that adds rows and figures to the [`BenchResult`]; [`measure`]
-//! calls one after the other. What this machine cannot do is a row that says why.
+//! calls one after the other. What this machine cannot do is a row that says why. An episode that a module plays is
+//! counted with [`audited`]: the physics audit holds for all of them.
 
 pub mod articulated;
+pub mod blocks;
+pub mod clock;
+pub mod expert;
+pub mod pace;
+pub mod peer;
+pub mod physics;
 pub mod primitives;
+pub mod rendering;
+pub mod snapshots;
 
 use super::BenchResult;
 use crate::cli::BenchArgs;
+use indicatif::{ProgressBar, ProgressStyle};
 
 /// Measures everything.
-///
-/// # Errors
-/// A world cannot be built.
 pub fn measure(args: &BenchArgs) -> anyhow::Result<BenchResult> {
-    let mut result = BenchResult::new("world", "none");
+    let mut result = BenchResult::new("world", "d435");
+    if cfg!(debug_assertions) {
+        result.notes.push("This is a debug build: its times and ratios of times mean nothing.".into());
+    }
+    physics::measure(args, &mut result)?;
+    rendering::measure(args, &mut result)?;
+    pace::measure(args, &mut result)?;
+    snapshots::measure(args, &mut result)?;
+    blocks::measure(args, &mut result)?;
     primitives::measure(args, &mut result)?;
     articulated::measure(args, &mut result)?;
     Ok(result)
+}
+
+/// Counts what the physics audit found in the episodes of a module.
+fn audited(result: &mut BenchResult, violations: u64) {
+    let sum = result.figures.get("audit_violations").copied().unwrap_or(0.0) + violations as f64;
+    result.figure("audit_violations", sum);
+}
+
+/// A bar on standard error that says how far a part has come.
+fn progress(what: &'static str, length: u64) -> ProgressBar {
+    let bar = ProgressBar::new(length);
+    let style = ProgressStyle::with_template(&format!("{what} {{bar:30}} {{pos}}/{{len}} {{elapsed}} eta {{eta}}"));
+    match style {
+        Ok(style) => bar.with_style(style),
+        Err(_template) => bar,
+    }
 }

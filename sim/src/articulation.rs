@@ -11,6 +11,7 @@ use crate::{
 use acm_concept::pose::{Pose, wrap_angle};
 use glam::{DQuat, DVec3};
 use rapier3d::prelude::*;
+use serde::{Deserialize, Serialize};
 
 /// How far dry friction gives way before it slips, metres or radians. Below its force it holds like a stiff spring:
 /// a mere brake lets a load creep by millimetres per second, because the solver's passes over one step are few.
@@ -272,6 +273,28 @@ impl Articulation {
     pub(crate) fn line(&self, world: &PhysicsWorld) -> (DVec3, DVec3) {
         let parent = world.bodies.get(self.parent).map_or(Pose::IDENTITY, |body| from_engine(body.position()));
         (parent.transform_point(self.joint.origin), parent.transform_vector(self.joint.axis))
+    }
+}
+
+/// All that a joint changes while the world runs, apart from its bodies and motors.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(crate) struct ArticulationState {
+    anchor: f64,
+    position: f64,
+    speed: f64,
+    pressed: bool,
+    presses: u32,
+    armed: bool,
+}
+
+impl Articulation {
+    pub(crate) fn state(&self) -> ArticulationState {
+        let Articulation { anchor, position, speed, pressed, presses, armed, .. } = *self;
+        ArticulationState { anchor, position, speed, pressed, presses, armed }
+    }
+    pub(crate) fn set_state(&mut self, state: ArticulationState) {
+        (self.anchor, self.position, self.speed) = (state.anchor, state.position, state.speed);
+        (self.pressed, self.presses, self.armed) = (state.pressed, state.presses, state.armed);
     }
 }
 

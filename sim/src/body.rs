@@ -1,7 +1,7 @@
 //! Objects in the engine: a body for each part that moves, and what can be known of them.
 
 use crate::{
-    articulation::{Articulation, let_pass},
+    articulation::{Articulation, ArticulationState, let_pass},
     contact::Contacts,
     convert::{from_engine, to_engine, vector},
     model::{
@@ -15,6 +15,7 @@ use crate::{
 use acm_concept::pose::{Pose, wrap_angle};
 use glam::DVec3;
 use rapier3d::prelude::*;
+use serde::{Deserialize, Serialize};
 
 /// An object in the engine. Its frame is the object's base frame.
 #[derive(Debug, Clone)]
@@ -173,6 +174,25 @@ impl Body {
             if joint.joint.latch.is_some() {
                 values.push(number(joint.is_latched()));
             }
+        }
+    }
+}
+
+/// What an object changes while the world runs, apart from its bodies.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(crate) struct BodyState {
+    start: Pose,
+    joints: Vec<ArticulationState>,
+}
+
+impl Body {
+    pub(crate) fn state(&self) -> BodyState {
+        BodyState { start: self.start, joints: self.joints.iter().map(|(_, joint)| joint.state()).collect() }
+    }
+    pub(crate) fn set_state(&mut self, state: BodyState) {
+        self.start = state.start;
+        for ((_, joint), saved) in self.joints.iter_mut().zip(state.joints) {
+            joint.set_state(saved);
         }
     }
 }

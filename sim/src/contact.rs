@@ -6,14 +6,15 @@ use crate::{
 };
 use glam::DVec3;
 use rapier3d::prelude::{ColliderHandle, ContactPair, PhysicsWorld};
+use serde::{Deserialize, Serialize};
 
 /// Contacts of every hand's two pads after one physics step. A suction cup counts as two pads on what it holds.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(crate) struct Contacts {
     hands: Vec<[PadContacts; 2]>,
 }
 
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 struct PadContacts {
     partners: Vec<ColliderHandle>,
     /// Force on the pad, world frame, newtons.
@@ -76,7 +77,7 @@ fn impulse_on(pair: &ContactPair, collider: ColliderHandle) -> DVec3 {
 }
 
 /// Forces summed over the steps of a control tick.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(crate) struct TickForces {
     pads: [DVec3; 2],
     wrist: DVec3,

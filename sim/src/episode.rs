@@ -1,12 +1,14 @@
 //! One episode of a scenario, and the handles through which an agent lives in it.
 
 use crate::{
+    audit::AuditReport,
     body::Body,
     model::info,
     oracle::OracleVerdict,
     report::{Preview, SimError, SimOptions, SimTimings},
     scenario::{Scenario, TaskTemplate},
     scene::{Ids, Stage, fnv, state_hash},
+    snapshot::{self, SavedRng, Snapshot, SnapshotError, Whole, WorldState},
     truth::TrueObject,
     world::{World, cpu_s},
 };
@@ -49,6 +51,8 @@ pub struct Simulation {
     cameras: Vec<Camera>,
     stage: Arc<Stage>,
     renderer: Option<SharedRenderer>,
+    /// Of the camera source that was handed out last.
+    eyes: Mutex<Arc<Mutex<Eyes>>>,
     seed: u64,
 }
 
@@ -80,6 +84,7 @@ impl Simulation {
         Ok(Simulation {
             shared: Arc::new(Mutex::new(world)),
             task: scenario.task.clone(),
+            eyes: Mutex::new(Arc::new(Mutex::new(Eyes::new(options.seed, cameras.len())))),
             cameras,
             stage: Arc::new(stage),
             renderer: None,
@@ -106,17 +111,15 @@ impl Simulation {
 
     /// The cameras. Frames are numbered from 0 by each source.
     pub fn camera(&self) -> Box<dyn CameraSource> {
-        let mut noise = ChaCha8Rng::seed_from_u64(self.seed);
-        noise.set_stream(STREAM_NOISE);
+        let eyes = Arc::new(Mutex::new(Eyes::new(self.seed, self.cameras.len())));
+        *lock(&self.eyes) = eyes.clone();
         Box::new(Cameras {
             shared: self.shared.clone(),
             models: self.cameras.iter().map(|camera| camera.nominal.clone()).collect(),
             cameras: self.cameras.clone(),
             stage: self.stage.clone(),
             renderer: self.renderer.clone(),
-            noise,
-            shown: vec![None; self.cameras.len()],
-            next: 0,
+            eyes,
         })
     }
 
@@ -177,6 +180,39 @@ impl Simulation {
     /// Processor time taken so far.
     pub fn timings(&self) -> SimTimings {
         self.world().timings
+    }
+
+    /// What happened without a cause so far; see [`AuditReport`].
+    pub fn audit(&self) -> AuditReport {
+        self.world().audit().clone()
+    }
+
+    /// The whole simulation at this moment, the camera source that was handed out last included.
+    ///
+    /// # Errors
+    /// The engine's state cannot be written down.
+    pub fn snapshot(&self) -> Result<Snapshot, SnapshotError> {
+        let world_digest = self.world_digest();
+        let world = WorldState::of(&self.world())?;
+        let eyes = lock(&self.eyes).clone();
+        let eyes = lock(&eyes).save();
+        Snapshot::pack(&Whole { world_digest, world, eyes })
+    }
+
+    /// Puts the simulation where one of the same scenario, seed and options was when the snapshot was made. The handles
+    /// that were given out stay good. On an error nothing has changed.
+    ///
+    /// # Errors
+    /// The snapshot is damaged, or of another world.
+    pub fn restore(&self, snapshot: &Snapshot) -> Result<(), SnapshotError> {
+        let whole = snapshot.unpack()?;
+        if whole.world_digest != self.world_digest() || !whole.world.fits(&self.world()) {
+            return Err(SnapshotError::OtherWorld);
+        }
+        whole.world.put_into(&mut self.world());
+        let eyes = lock(&self.eyes).clone();
+        *lock(&eyes) = Eyes::restore(whole.eyes);
+        Ok(())
     }
 
     /// Equal for worlds whose bodies have bit-identical poses.
@@ -275,10 +311,34 @@ struct Cameras {
     cameras: Vec<Camera>,
     stage: Arc<Stage>,
     renderer: Option<SharedRenderer>,
+    eyes: Arc<Mutex<Eyes>>,
+}
+
+/// What a camera source changes from frame to frame.
+struct Eyes {
     noise: ChaCha8Rng,
     /// What each camera showed last.
     shown: Vec<Option<Picture>>,
+    /// Number of the next frame.
     next: u64,
+}
+
+impl Eyes {
+    fn new(seed: u64, cameras: usize) -> Eyes {
+        let mut noise = ChaCha8Rng::seed_from_u64(seed);
+        noise.set_stream(STREAM_NOISE);
+        Eyes { noise, shown: vec![None; cameras], next: 0 }
+    }
+    fn save(&self) -> snapshot::Eyes {
+        let planes = |picture: &Picture| (picture.color.to_vec(), picture.depth.to_vec());
+        let shown = self.shown.iter().map(|shown| shown.as_ref().map(planes)).collect();
+        snapshot::Eyes { noise: SavedRng::of(&self.noise), next: self.next, shown }
+    }
+    fn restore(saved: snapshot::Eyes) -> Eyes {
+        let picture = |(color, depth): (Vec<u8>, Vec<f32>)| Picture { color: color.into(), depth: depth.into() };
+        let shown = saved.shown.into_iter().map(|shown| shown.map(picture)).collect();
+        Eyes { noise: saved.noise.rng(), shown, next: saved.next }
+    }
 }
 
 /// Colour and depth of a frame.
@@ -300,9 +360,9 @@ impl CameraSource for Cameras {
         };
         let found = &self.cameras[at];
         let renderer = self.renderer.as_ref().ok_or_else(|| failed("the simulation has no renderer".into()))?;
-        let mut world = lock(&self.shared);
+        let (mut world, mut eyes) = (lock(&self.shared), lock(&self.eyes));
         let pixels = found.nominal.intrinsics.pixels();
-        let stuck = if world.is_frozen(at) { self.shown.get(at).cloned().flatten() } else { None };
+        let stuck = if world.is_frozen(at) { eyes.shown.get(at).cloned().flatten() } else { None };
         let picture = if let Some(stuck) = stuck {
             stuck
         } else if world.is_covered(at) {
@@ -315,19 +375,19 @@ impl CameraSource for Cameras {
             world.timings.render_s += cpu_s(ClockId::ProcessCPUTime) - started;
             let started = cpu_s(ClockId::ThreadCPUTime);
             expose(&mut rendered.color, world.exposures.get(at).copied().unwrap_or(1.0));
-            let measured = found.sensor.measure(&rendered, &truth, &mut self.noise);
+            let measured = found.sensor.measure(&rendered, &truth, &mut eyes.noise);
             world.timings.noise_s += cpu_s(ClockId::ThreadCPUTime) - started;
             Picture { color: measured.color.into(), depth: measured.depth.into() }
         };
         let header = FrameHeader {
-            id: FrameId(self.next),
+            id: FrameId(eyes.next),
             camera: camera.into(),
             time: world.now(),
             intrinsics: found.nominal.intrinsics,
             camera_pose: world.placed(&found.nominal).pose,
         };
-        self.next += 1;
-        if let Some(shown) = self.shown.get_mut(at) {
+        eyes.next += 1;
+        if let Some(shown) = eyes.shown.get_mut(at) {
             *shown = Some(picture.clone());
         }
         RgbdFrame::new(header, picture.color, picture.depth).map_err(|e| failed(e.to_string()))

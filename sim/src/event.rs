@@ -11,6 +11,7 @@ use crate::{
 use acm_concept::pose::Pose;
 use glam::DVec3;
 use rapier3d::prelude::{PhysicsWorld, RigidBodyType};
+use serde::{Deserialize, Serialize};
 
 /// A scripted event.
 #[derive(Debug, Clone)]
@@ -19,7 +20,7 @@ pub(crate) struct Event {
     after_s: f64,
     over_s: f64,
     deed: Deed,
-    phase: Phase,
+    pub(crate) phase: Phase,
 }
 
 #[derive(Debug, Clone)]
@@ -29,8 +30,9 @@ enum Deed {
     Freeze { cameras: Vec<usize> },
 }
 
-#[derive(Debug, Clone, Copy)]
-enum Phase {
+/// How far an event has come: all that it changes while the world runs.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+pub(crate) enum Phase {
     Waiting,
     /// The timer runs until this moment.
     Timed(f64),

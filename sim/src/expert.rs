@@ -40,6 +40,13 @@ impl Expert {
         let tcp = robot.description().home;
         Expert { simulation, robot, tcp, opening_m: OPEN_M, slip_m: 0.0, strongest_press_n: 0.0 }
     }
+    /// Where the expert's plan stands: a restored world must be commanded from there on.
+    pub(crate) fn plan(&self) -> (Pose, f64) {
+        (self.tcp, self.opening_m)
+    }
+    pub(crate) fn set_plan(&mut self, plan: (Pose, f64)) {
+        (self.tcp, self.opening_m) = plan;
+    }
     pub(crate) fn object(&self, name: &str) -> TrueObject {
         self.simulation.truth().into_iter().find(|object| object.name == name).unwrap()
     }

@@ -9,6 +9,7 @@ use crate::{
 };
 use acm_concept::pose::Pose;
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 
 /// Regions and fluents of a running world. Their values are variables of the judge.
 #[derive(Debug, Clone, Default)]
@@ -55,7 +56,29 @@ pub(crate) fn names<'a>(
     regions.flat_map(of_region).chain(fluents.map(str::to_owned)).collect()
 }
 
+/// All that they change while the world runs: values, and which rules hold.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(crate) struct FluentState {
+    values: Vec<f64>,
+    held: Vec<bool>,
+}
+
 impl Fluents {
+    pub(crate) fn state(&self) -> FluentState {
+        FluentState {
+            values: self.fluents.iter().map(|fluent| fluent.value).collect(),
+            held: self.rules.iter().map(|rule| rule.held).collect(),
+        }
+    }
+    pub(crate) fn set_state(&mut self, state: FluentState) {
+        for (fluent, value) in self.fluents.iter_mut().zip(state.values) {
+            fluent.value = value;
+        }
+        for (rule, held) in self.rules.iter_mut().zip(state.held) {
+            rule.held = held;
+        }
+    }
+
     /// The fluents of a world at its start.
     pub(crate) fn build(spec: &WorldSpec, layout: &Layout, variables: &[String]) -> Result<Fluents, LayoutError> {
         let scope = layout.scope();

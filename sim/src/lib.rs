@@ -12,12 +12,15 @@
 //! | `event`, `mishap` | what third parties do, and mishaps with what is carried |
 //! | `fluent` | regions, named quantities and the rules that change them |
 //! | `oracle`, `state` | the judge and its variables |
+//! | `audit` | whether whatever happened had a cause |
+//! | `snapshot` | all of it as bytes, and back |
 //! | `episode`, `scene`, `truth`, `report` | the handles, the picture, the truth, what is reported |
 //!
 //! Conventions: metres, seconds, newtons; world frame with z up; an object's base frame is the middle of its bottom.
 //! The world advances only when the robot is commanded or the clock waits.
 
 mod articulation;
+mod audit;
 mod body;
 mod contact;
 mod convert;
@@ -39,12 +42,14 @@ mod scenario;
 mod scene;
 #[cfg(test)]
 mod shared_data;
+mod snapshot;
 mod state;
 #[cfg(test)]
 mod testbed;
 mod truth;
 mod world;
 
+pub use audit::AuditReport;
 pub use episode::{SharedRenderer, Simulation};
 pub use layout::LayoutError;
 pub use mishap::MishapKind;
@@ -54,4 +59,5 @@ pub use random::DrawError;
 pub use report::{Preview, SimError, SimOptions, SimTimings};
 pub use robot::RobotError;
 pub use scenario::{MAX_SCENARIO_BYTES, Scenario, ScenarioError, Setting};
+pub use snapshot::{Snapshot, SnapshotError};
 pub use truth::{TrueJoint, TrueLink, TrueObject, TruePiece, TrueShape};

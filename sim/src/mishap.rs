@@ -1,6 +1,6 @@
 //! Mishaps with what the hand carries: it is gone and stands somewhere near, or the fingers let it fall.
 
-use crate::{body::Body, event::put, layout::gap, placed::solids_at, world::World};
+use crate::{body::Body, event::put, layout::gap, placed::solids_at, snapshot::SavedRng, world::World};
 use acm_concept::{camera::CameraModel, pose::Pose};
 use glam::{DVec2, DVec3};
 use rand::{Rng, SeedableRng};
@@ -52,15 +52,35 @@ pub(crate) struct Mishap {
     open_until_s: f64,
 }
 
-#[derive(Debug, Clone, Copy)]
-struct Gripped {
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+pub(crate) struct Gripped {
     body: usize,
     height_m: f64,
     last_touched_s: f64,
     counted: bool,
 }
 
+/// All that a mishap changes while the world runs.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(crate) struct MishapState {
+    rng: SavedRng,
+    carries: u32,
+    gripped: Option<Gripped>,
+    done: bool,
+    open_until_s: f64,
+}
+
 impl Mishap {
+    pub(crate) fn state(&self) -> MishapState {
+        let Mishap { carries, gripped, done, open_until_s, .. } = *self;
+        MishapState { rng: SavedRng::of(&self.rng), carries, gripped, done, open_until_s }
+    }
+    pub(crate) fn set_state(&mut self, state: MishapState) {
+        self.rng = state.rng.rng();
+        (self.carries, self.gripped) = (state.carries, state.gripped);
+        (self.done, self.open_until_s) = (state.done, state.open_until_s);
+    }
+
     pub(crate) fn new(kind: MishapKind, at_carry: u32, seed: u64, camera: Option<CameraModel>) -> Mishap {
         // A stream of its own: the mishap changes nothing else.
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -109,6 +129,7 @@ impl Mishap {
             let pose = self.candidate(world, &world.bodies[gripped.body]);
             if let Some(pose) = pose.filter(|pose| self.is_free(world, gripped.body, pose)) {
                 put(&mut world.physics, &world.bodies[gripped.body], &pose);
+                world.excuse(gripped.body);
                 self.done = true;
                 return;
             }

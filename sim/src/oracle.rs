@@ -5,7 +5,7 @@ use crate::{
     scenario::{JudgeSpec, PredicateSpec},
 };
 use acm_concept::expression::Expression;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 const WORLD_VARIABLES: [&str; 7] =
     ["others_moved", "commanded_opening", "pad_contact", "tcp_x", "tcp_y", "tcp_z", "time"];
@@ -163,6 +163,67 @@ impl Predicate {
             None => {}
         }
         sentences.join(" ")
+    }
+}
+
+/// All that a predicate changes while the world runs: of each stage how long it has held and whether it was reached,
+/// of each violation when it happened.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+struct PredicateState {
+    stages: Vec<(f64, bool)>,
+    violations: Vec<Option<f64>>,
+}
+
+impl Predicate {
+    fn state(&self) -> PredicateState {
+        PredicateState {
+            stages: self.stages.iter().map(|stage| (stage.held_s, stage.reached)).collect(),
+            violations: self.violations.iter().map(|violation| violation.happened_at_s).collect(),
+        }
+    }
+    fn set_state(&mut self, state: PredicateState) {
+        for (stage, saved) in self.stages.iter_mut().zip(state.stages) {
+            (stage.held_s, stage.reached) = saved;
+        }
+        for (violation, saved) in self.violations.iter_mut().zip(state.violations) {
+            violation.happened_at_s = saved;
+        }
+    }
+}
+
+impl PredicateState {
+    fn fits(&self, predicate: &Predicate) -> bool {
+        self.stages.len() == predicate.stages.len() && self.violations.len() == predicate.violations.len()
+    }
+}
+
+/// All that the judge changes while the world runs.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(crate) struct JudgeState {
+    strict: PredicateState,
+    faithful: Option<PredicateState>,
+}
+
+impl JudgeState {
+    /// Whether it can be the state of this judge.
+    pub(crate) fn fits(&self, judge: &Judge) -> bool {
+        let faithful = match (&self.faithful, &judge.faithful) {
+            (Some(state), Some(predicate)) => state.fits(predicate),
+            (state, predicate) => state.is_none() && predicate.is_none(),
+        };
+        faithful && self.strict.fits(&judge.strict)
+    }
+}
+
+impl Judge {
+    pub(crate) fn state(&self) -> JudgeState {
+        JudgeState { strict: self.strict.state(), faithful: self.faithful.as_ref().map(Predicate::state) }
+    }
+    pub(crate) fn set_state(&mut self, state: JudgeState) {
+        self.strict.set_state(state.strict);
+        if let (Some(faithful), Some(saved)) = (&mut self.faithful, state.faithful) {
+            faithful.set_state(saved);
+        }
     }
 }
 

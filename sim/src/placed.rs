@@ -3,14 +3,14 @@
 use crate::{
     layout::{LayoutError, number, vector},
     model::{
-        self, Link, Piece,
+        self, Link, Piece, Weight,
         normalise::{self, Original},
         shape::Shape,
     },
     random::Scope,
     scenario::{ObjectSpec, RawPerturb},
 };
-use acm_concept::{pose::Pose, solid::Solid};
+use acm_concept::{expression::Expression, pose::Pose, solid::Solid};
 use glam::DVec3;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -51,7 +51,8 @@ impl Placed {
             if let (Some(joint), Some((_, start))) = (&mut joint, make.starts.iter().find(|(link, _)| *link == at)) {
                 joint.start = *start;
             }
-            Link { pieces, joint, ..link.clone() }
+            let friction = make.friction.unwrap_or(link.friction);
+            Link { pieces, joint, weight: make.weight(link), friction, ..link.clone() }
         };
         let mut links: Vec<Link> = spec.model.links.iter().enumerate().map(link).collect();
         if let Some(loaded) = &spec.model.loaded {
@@ -157,12 +158,34 @@ pub(crate) fn solids_at(object: &Placed, pose: &Pose) -> Vec<(Pose, SharedShape)
 pub(crate) struct Make {
     scale: DVec3,
     hue_deg: Option<f64>,
+    density_kg_m3: Option<f64>,
+    friction: Option<f64>,
     /// Links, and where their joints start.
     starts: Vec<(usize, f64)>,
 }
 
+/// An optional expression whose value must lie in a range.
+fn within(
+    name: &str,
+    field: &str,
+    expression: Option<&Expression>,
+    range: std::ops::RangeInclusive<f64>,
+    scope: &Scope,
+) -> Result<Option<f64>, LayoutError> {
+    let Some(expression) = expression else { return Ok(None) };
+    let value = number(name, expression, scope)?;
+    if range.contains(&value) {
+        return Ok(Some(value));
+    }
+    let reason = format!("{field} {value} must lie in {} to {}", range.start(), range.end());
+    Err(LayoutError::Value { name: name.into(), reason })
+}
+
 /// Factors beyond these make no sense.
 const SCALES: std::ops::RangeInclusive<f64> = 0.1..=10.0;
+/// From a foam to the heaviest metals, kg/m3.
+const DENSITIES: std::ops::RangeInclusive<f64> = 1.0..=25_000.0;
+const FRICTIONS: std::ops::RangeInclusive<f64> = 0.0..=2.0;
 
 impl Make {
     pub(crate) fn of(spec: &ObjectSpec, scope: &Scope) -> Result<Make, LayoutError> {
@@ -185,7 +208,17 @@ impl Make {
             }
             starts.push((*link, start));
         }
-        Ok(Make { scale, hue_deg, starts })
+        let density_kg_m3 = within(&spec.name, "density_kg_m3", spec.density_kg_m3.as_ref(), DENSITIES, scope)?;
+        let friction = within(&spec.name, "friction", spec.friction.as_ref(), FRICTIONS, scope)?;
+        Ok(Make { scale, hue_deg, density_kg_m3, friction, starts })
+    }
+
+    /// What a link weighs.
+    fn weight(&self, link: &Link) -> Weight {
+        match (self.density_kg_m3, link.weight) {
+            (Some(density), Weight::Density(_)) => Weight::Density(density),
+            (_, weight) => weight,
+        }
     }
 
     /// Stretches sizes and places along the object's axes, angles kept, and turns the hue.

@@ -1,6 +1,7 @@
 //! The running world: physics, robot, mechanisms, what third parties do, and the judge who watches.
 
 use crate::{
+    audit::{Audit, AuditReport},
     body::Body,
     contact::Contacts,
     event::{self, Event},
@@ -14,6 +15,7 @@ use crate::{
     report::{SimError, SimOptions, SimTimings},
     robot::{Robot, TICK_S},
     scenario::{CameraSpec, JudgeSpec, Scenario, SurfaceSpec, WorldSpec},
+    snapshot::WorldState,
     state,
     truth::{TrueObject, true_objects},
 };
@@ -45,10 +47,11 @@ pub(crate) struct World {
     pub(crate) surfaces: Vec<(ColliderHandle, SurfaceSpec)>,
     pub(crate) contacts: Contacts,
     pub(crate) timings: SimTimings,
-    events: Vec<Event>,
-    mishaps: Vec<Mishap>,
+    pub(crate) events: Vec<Event>,
+    pub(crate) mishaps: Vec<Mishap>,
     pub(crate) fluents: Fluents,
-    judge: Judge,
+    pub(crate) judge: Judge,
+    pub(crate) audit: Audit,
     pub(crate) lighting: Lighting,
     /// Factors by which the cameras' colours are too bright.
     pub(crate) exposures: Vec<f64>,
@@ -57,9 +60,9 @@ pub(crate) struct World {
     pub(crate) state: Vec<f64>,
     pub(crate) constants: Vec<f64>,
     pub(crate) bystanders: Vec<usize>,
-    steps: u64,
+    pub(crate) steps: u64,
     motion: bool,
-    stopped: bool,
+    pub(crate) stopped: bool,
 }
 
 impl World {
@@ -100,6 +103,7 @@ impl World {
         Ok(World {
             bystanders: bystanders(spec, &scenario.judge, &bodies),
             judge: Judge::new(&scenario.judge, &variables),
+            audit: Audit::default(),
             constants: state::constants(spec, layout),
             state: vec![0.0; variables.len()],
             mishaps: mishaps(spec, options),
@@ -148,6 +152,7 @@ impl World {
         }
         self.contacts.read(&self.physics, &self.robot);
         self.refresh_state();
+        self.look_for_causes();
         Ok(())
     }
 
@@ -179,6 +184,8 @@ impl World {
         for step in 1..=steps {
             self.step(f64::from(step) / f64::from(steps));
         }
+        let hands: Vec<_> = self.robot.hands(&self.physics).collect();
+        self.audit.grip(&hands, self.seconds());
         self.timings.physics_s += cpu_s(ClockId::ThreadCPUTime) - started;
         self.robot.end()
     }
@@ -207,9 +214,27 @@ impl World {
             mishap.step(self);
         }
         self.mishaps = mishaps;
+        self.look_for_causes();
         self.fluents.step(&self.state, self.profile.step_s());
         self.refresh_state();
         self.judge.step(&self.state, self.seconds(), self.profile.step_s());
+    }
+
+    fn look_for_causes(&mut self) {
+        let hands: Vec<_> = self.robot.hands(&self.physics).collect();
+        let now_s = self.seconds();
+        self.audit.step(&self.physics, &self.robot.bodies(), &hands, now_s);
+    }
+
+    /// What happened without a cause so far.
+    pub(crate) fn audit(&self) -> &AuditReport {
+        self.audit.report()
+    }
+    /// Something outside of the world moves an object on purpose.
+    pub(crate) fn excuse(&mut self, body: usize) {
+        for handle in self.bodies.get(body).into_iter().flat_map(Body::handles) {
+            self.audit.excuse(handle);
+        }
     }
 
     fn refresh_state(&mut self) {
@@ -273,15 +298,14 @@ impl World {
     /// How the episode stands. The judge looks a little further than the present, so that a stage that has to hold
     /// for a while is not missed by an agent that stops at once; the world itself does not advance.
     pub(crate) fn verdict(&mut self) -> OracleVerdict {
-        let Ok(ahead) = copy(&self.physics) else { return self.judge.verdict(&self.state) };
-        let saved = Saved::take(self, ahead);
+        let Ok(now) = WorldState::of(self) else { return self.audit.void(self.judge.verdict(&self.state)) };
         let until = self.seconds() + self.judge.settle_s();
         while self.seconds() < until {
             self.step(1.0);
         }
         let verdict = self.judge.verdict(&self.state);
-        saved.restore(self);
-        verdict
+        now.put_into(self);
+        self.audit.void(verdict)
     }
 
     pub(crate) fn truth(&self) -> Vec<TrueObject> {
@@ -291,55 +315,6 @@ impl World {
 
 /// Longest single wait, seconds.
 const MAX_WAIT_S: f64 = 3600.0;
-
-/// What a look ahead changes.
-struct Saved {
-    physics: PhysicsWorld,
-    bodies: Vec<Body>,
-    robot: Robot,
-    contacts: Contacts,
-    judge: Judge,
-    events: Vec<Event>,
-    mishaps: Vec<Mishap>,
-    fluents: Fluents,
-    state: Vec<f64>,
-    steps: u64,
-}
-
-impl Saved {
-    /// Puts the present aside; the world goes on with a copy of its physics.
-    fn take(world: &mut World, ahead: PhysicsWorld) -> Saved {
-        Saved {
-            physics: std::mem::replace(&mut world.physics, ahead),
-            bodies: world.bodies.clone(),
-            robot: world.robot.clone(),
-            contacts: world.contacts.clone(),
-            judge: world.judge.clone(),
-            events: world.events.clone(),
-            mishaps: world.mishaps.clone(),
-            fluents: world.fluents.clone(),
-            state: world.state.clone(),
-            steps: world.steps,
-        }
-    }
-    fn restore(self, world: &mut World) {
-        world.physics = self.physics;
-        world.bodies = self.bodies;
-        world.robot = self.robot;
-        world.contacts = self.contacts;
-        world.judge = self.judge;
-        world.events = self.events;
-        world.mishaps = self.mishaps;
-        world.fluents = self.fluents;
-        world.state = self.state;
-        world.steps = self.steps;
-    }
-}
-
-/// A copy that goes on exactly as the original would. The engine's state has no other way of being copied.
-fn copy(physics: &PhysicsWorld) -> Result<PhysicsWorld, bincode::Error> {
-    bincode::deserialize(&bincode::serialize(physics)?)
-}
 
 fn insert_surface(physics: &mut PhysicsWorld, surface: &SurfaceSpec) -> ColliderHandle {
     let half = (surface.size * 0.5).as_vec3();

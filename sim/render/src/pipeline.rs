@@ -1,6 +1,7 @@
 //! The device-side programs and the layouts of what they read.
 
 use bytemuck::{Pod, Zeroable};
+use std::collections::BTreeMap;
 use wgpu::{BindingType, ShaderStages, TextureFormat};
 
 /// Colour as 8-bit sRGB; depth as the bits of a float, because float targets cannot be drawn to on GL; ids.
@@ -45,11 +46,22 @@ pub(crate) struct Style {
     pub patterned: bool,
 }
 
+/// How a frame is lit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Light {
+    /// Number of point lights.
+    pub points: u32,
+    pub shadows: bool,
+}
+
 /// All programs.
 pub(crate) struct Pipelines {
     pub frame_layout: wgpu::BindGroupLayout,
     pub shadow_layout: wgpu::BindGroupLayout,
-    main: [wgpu::RenderPipeline; 4],
+    shader: wgpu::ShaderModule,
+    main_layout: wgpu::PipelineLayout,
+    /// Made when they are first needed: at most 4 styles by 10 ways of being lit.
+    main: BTreeMap<(Style, Light), wgpu::RenderPipeline>,
     shadow: [wgpu::RenderPipeline; 2],
 }
 
@@ -67,21 +79,22 @@ impl Pipelines {
         };
         let main_layout = layout(&[Some(&frame_layout), Some(&shadow_layout)]);
         let cast_layout = layout(&[Some(&frame_layout)]);
-        let main = [(false, false), (false, true), (true, false), (true, true)].map(|(closed, patterned)| {
-            let fragment = if patterned { "fragment_pattern" } else { "fragment_plain" };
-            pipeline(device, &main_layout, &shader, "vertex_main", Some(fragment), closed)
-        });
         let shadow = [false, true].map(|closed| pipeline(device, &cast_layout, &shader, "vertex_shadow", None, closed));
-        Pipelines { frame_layout, shadow_layout, main, shadow }
+        Pipelines { frame_layout, shadow_layout, shader, main_layout, main: BTreeMap::new(), shadow }
     }
 
-    pub(crate) fn main(&self, style: Style) -> &wgpu::RenderPipeline {
-        match (style.closed, style.patterned) {
-            (false, false) => &self.main[0],
-            (false, true) => &self.main[1],
-            (true, false) => &self.main[2],
-            (true, true) => &self.main[3],
-        }
+    /// Makes the program for a style and light, if there is none yet.
+    pub(crate) fn prepare(&mut self, device: &wgpu::Device, style: Style, light: Light) {
+        self.main.entry((style, light)).or_insert_with(|| {
+            let entry_point = if style.patterned { "fragment_pattern" } else { "fragment_plain" };
+            let fragment = Some((entry_point, light));
+            pipeline(device, &self.main_layout, &self.shader, "vertex_main", fragment, style.closed)
+        });
+    }
+
+    /// The program for a style and light that it was prepared for.
+    pub(crate) fn main(&self, style: Style, light: Light) -> Option<&wgpu::RenderPipeline> {
+        self.main.get(&(style, light))
     }
 
     pub(crate) fn shadow(&self, style: Style) -> &wgpu::RenderPipeline {
@@ -119,7 +132,7 @@ fn pipeline(
     layout: &wgpu::PipelineLayout,
     shader: &wgpu::ShaderModule,
     vertex: &str,
-    fragment: Option<&str>,
+    fragment: Option<(&str, Light)>,
     closed: bool,
 ) -> wgpu::RenderPipeline {
     let vertex_attributes = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3];
@@ -135,8 +148,10 @@ fn pipeline(
     ];
     let targets = TARGET_FORMATS
         .map(|format| Some(wgpu::ColorTargetState { format, blend: None, write_mask: wgpu::ColorWrites::ALL }));
+    let light = fragment.map_or(Light { points: 0, shadows: false }, |(_, light)| light);
+    let constants = [("POINTS", f64::from(light.points)), ("SHADOWS", f64::from(u8::from(light.shadows)))];
     device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label: fragment.or(Some(vertex)),
+        label: fragment.map(|(entry_point, _)| entry_point).or(Some(vertex)),
         layout: Some(layout),
         vertex: wgpu::VertexState {
             module: shader,
@@ -156,10 +171,13 @@ fn pipeline(
             bias: wgpu::DepthBiasState::default(),
         }),
         multisample: wgpu::MultisampleState::default(),
-        fragment: fragment.map(|entry_point| wgpu::FragmentState {
+        fragment: fragment.map(|(entry_point, _)| wgpu::FragmentState {
             module: shader,
             entry_point: Some(entry_point),
-            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            compilation_options: wgpu::PipelineCompilationOptions {
+                constants: &constants,
+                ..wgpu::PipelineCompilationOptions::default()
+            },
             targets: &targets,
         }),
         multiview_mask: None,

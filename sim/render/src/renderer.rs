@@ -3,7 +3,7 @@
 use crate::{
     adapter::{self, AdapterReport},
     batch::{Batches, MeshCache, linear},
-    pipeline::{DEPTH_FORMAT, FrameRaw, InstanceRaw, Pipelines},
+    pipeline::{DEPTH_FORMAT, FrameRaw, InstanceRaw, Light, Pipelines},
     projection::clip_from_camera,
     scene::{Lighting, MAX_INSTANCES, MAX_POINT_LIGHTS, MAX_SHADOW_MAP, MAX_TRIANGLES, Scene},
     shadow::{self, ShadowView},
@@ -131,9 +131,24 @@ impl Renderer {
     /// # Errors
     /// No adapter works: the error says what to install.
     pub fn new() -> Result<Renderer, RendererError> {
+        Renderer::on_first(|_| true)
+    }
+
+    /// The best adapter of one backend, `vulkan` or `gl`: to compare drivers.
+    ///
+    /// # Errors
+    /// As [`Renderer::new`].
+    pub fn by(backend: &str) -> Result<Renderer, RendererError> {
+        Renderer::on_first(|report| report.backend == backend)
+    }
+
+    fn on_first(wanted: impl Fn(&AdapterReport) -> bool) -> Result<Renderer, RendererError> {
         let mut tried = Vec::new();
         for adapter in adapter::candidates() {
             let report = adapter::report(&adapter.get_info());
+            if !wanted(&report) {
+                continue;
+            }
             let limits = wgpu::Limits::downlevel_defaults().using_resolution(adapter.limits());
             let descriptor = wgpu::DeviceDescriptor { required_limits: limits, ..wgpu::DeviceDescriptor::default() };
             match pollster::block_on(adapter.request_device(&descriptor)) {
@@ -198,7 +213,11 @@ impl Renderer {
         if view.is_some() {
             self.draw_shadow(&mut encoder, &batches);
         }
-        self.draw_main(&mut encoder, &batches, &self.targets[target], linear(scene.background));
+        let light = Light { points: scene.lights.points.len() as u32, shadows: view.is_some() };
+        for draw in &batches.draws {
+            self.pipelines.prepare(&self.device, draw.style, light);
+        }
+        self.draw_main(&mut encoder, &batches, &self.targets[target], linear(scene.background), light);
         self.targets[target].copy(&mut encoder);
         self.queue.submit([encoder.finish()]);
         let rendered = self.targets[target].read(&self.device);
@@ -261,13 +280,22 @@ impl Renderer {
         }
     }
 
-    fn draw_main(&self, encoder: &mut wgpu::CommandEncoder, batches: &Batches, target: &Targets, background: [f32; 3]) {
+    fn draw_main(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        batches: &Batches,
+        target: &Targets,
+        background: [f32; 3],
+        light: Light,
+    ) {
         let mut pass = target.begin(encoder, background);
         pass.set_bind_group(0, &self.frame_group, &[]);
         pass.set_bind_group(1, &self.shadow.group, &[]);
         for draw in &batches.draws {
-            pass.set_pipeline(self.pipelines.main(draw.style));
-            self.draw(&mut pass, draw);
+            if let Some(pipeline) = self.pipelines.main(draw.style, light) {
+                pass.set_pipeline(pipeline);
+                self.draw(&mut pass, draw);
+            }
         }
     }
 
@@ -374,13 +402,12 @@ fn frame_raw(lights: &Lighting, camera: &CameraModel, camera_from_world: &Pose, 
     }
     let shadow_from_camera = view.map_or(DMat4::IDENTITY, |view| view.clip_from_camera);
     let offset = view.map_or(0.0, |view| SHADOW_OFFSET_TEXELS * view.texel_m) as f32;
-    let has_shadow = if view.is_some() { 1.0 } else { 0.0 };
     FrameRaw {
         clip_from_camera: clip_from_camera(&camera.intrinsics).as_mat4().to_cols_array_2d(),
         shadow_from_camera: shadow_from_camera.as_mat4().to_cols_array_2d(),
         sun: to_sun.as_vec3().extend(lights.sun.intensity / PI).to_array(),
         points,
-        misc: [lights.ambient, lights.points.len() as f32, offset, has_shadow],
+        misc: [lights.ambient, offset, 0.0, 0.0],
     }
 }
 

@@ -7,10 +7,14 @@ struct Frame {
     sun: vec4<f32>,
     // xyz: position; w: intensity / pi. Unused ones have intensity 0.
     points: array<vec4<f32>, 4>,
-    // x: ambient; y: number of point lights; z: metres by which shadow look-ups are moved along the normal; w: 1 with
-    // shadows.
+    // x: ambient; y: metres by which shadow look-ups are moved along the normal.
     misc: vec4<f32>,
 };
+// A program for each number of lights and with or without shadows: processors that draw run the same code for every
+// pixel, and pay for a loop or a look-up that is not wanted.
+override POINTS: u32 = 4u;
+override SHADOWS: bool = true;
+
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(1) @binding(0) var shadow_map: texture_depth_2d;
 @group(1) @binding(1) var shadow_sampler: sampler_comparison;
@@ -39,6 +43,9 @@ struct Surface {
     @location(4) @interpolate(flat) color: vec4<f32>,
     @location(5) @interpolate(flat) pattern: vec4<f32>,
     @location(6) @interpolate(flat) id: u32,
+    // Where to look in the shadow map, and with which depth. The sun's rays are parallel, so this is as linear as the
+    // position is.
+    @location(7) sunward: vec3<f32>,
 };
 
 struct Pixel {
@@ -66,7 +73,16 @@ fn vertex_main(v: Vertex) -> Surface {
     out.color = v.color;
     out.pattern = v.pattern;
     out.id = v.id;
+    let moved = out.position + facing(out.position, out.normal) * frame.misc.y;
+    let sunward = frame.shadow_from_camera * vec4<f32>(moved, 1.0);
+    out.sunward = vec3<f32>(sunward.xy * vec2<f32>(0.5, -0.5) + vec2<f32>(0.5), sunward.z);
     return out;
+}
+
+// The unit normal on the side that is seen: the back of an open surface is lit like a front.
+fn facing(position: vec3<f32>, normal: vec3<f32>) -> vec3<f32> {
+    let unit = normalize(normal);
+    return select(unit, -unit, dot(unit, position) > 0.0);
 }
 
 @vertex
@@ -103,24 +119,34 @@ fn is_painted(kind: f32, local: vec3<f32>, normal: vec3<f32>) -> bool {
     return hash(cell) % 6u == 0u;
 }
 
-fn sunlit(position: vec3<f32>, normal: vec3<f32>) -> f32 {
-    let moved = position + normal * frame.misc.z;
-    let clip = frame.shadow_from_camera * vec4<f32>(moved, 1.0);
-    let uv = clip.xy * vec2<f32>(0.5, -0.5) + vec2<f32>(0.5);
-    let lit = textureSampleCompareLevel(shadow_map, shadow_sampler, uv, clip.z);
-    let outside = any(uv < vec2<f32>(0.0)) || any(uv > vec2<f32>(1.0));
-    return select(lit, 1.0, outside || frame.misc.w < 0.5);
+fn sunlit(at: vec3<f32>) -> f32 {
+    if (!SHADOWS) {
+        return 1.0;
+    }
+    let lit = textureSampleCompareLevel(shadow_map, shadow_sampler, at.xy, at.z);
+    return select(lit, 1.0, any(abs(at.xy - vec2<f32>(0.5)) > vec2<f32>(0.5)));
+}
+
+fn lamp(point: vec4<f32>, position: vec3<f32>, normal: vec3<f32>) -> f32 {
+    let towards = point.xyz - position;
+    let nearness = inverseSqrt(max(dot(towards, towards), 1e-4));
+    return point.w * max(dot(normal, towards), 0.0) * nearness * nearness * nearness;
 }
 
 fn shade(in: Surface, base: vec3<f32>) -> Pixel {
-    var normal = normalize(in.normal);
-    // The back of an open surface is lit like a front.
-    normal = select(normal, -normal, dot(normal, in.position) > 0.0);
-    var light = frame.misc.x + frame.sun.w * max(dot(normal, frame.sun.xyz), 0.0) * sunlit(in.position, normal);
-    for (var k = 0u; k < u32(frame.misc.y); k += 1u) {
-        let towards = frame.points[k].xyz - in.position;
-        let nearness = inverseSqrt(max(dot(towards, towards), 1e-4));
-        light += frame.points[k].w * max(dot(normal, towards), 0.0) * nearness * nearness * nearness;
+    let normal = facing(in.position, in.normal);
+    var light = frame.misc.x + frame.sun.w * max(dot(normal, frame.sun.xyz), 0.0) * sunlit(in.sunward);
+    if (POINTS > 0u) {
+        light += lamp(frame.points[0], in.position, normal);
+    }
+    if (POINTS > 1u) {
+        light += lamp(frame.points[1], in.position, normal);
+    }
+    if (POINTS > 2u) {
+        light += lamp(frame.points[2], in.position, normal);
+    }
+    if (POINTS > 3u) {
+        light += lamp(frame.points[3], in.position, normal);
     }
     let color = base * light;
     var out: Pixel;

@@ -5,6 +5,7 @@ use crate::convert::{from_engine, to_engine};
 use acm_concept::{embodiment::SuctionCup, pose::Pose};
 use glam::DVec3;
 use rapier3d::{parry::query::Ray, prelude::*};
+use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
 /// Places on the rim that must all lie on the face.
@@ -29,12 +30,12 @@ pub(crate) struct Cup {
     venting_s: f64,
     /// The vacuum as a share of the pump's best.
     pub(crate) vacuum: f64,
-    seal: Option<Seal>,
+    pub(super) seal: Option<Seal>,
 }
 
 /// What the cup holds.
-#[derive(Debug, Clone)]
-struct Seal {
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) struct Seal {
     body: RigidBodyHandle,
     collider: ColliderHandle,
     joint: ImpulseJointHandle,

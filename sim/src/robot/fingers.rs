@@ -10,9 +10,10 @@ use glam::DVec3;
 use rapier3d::prelude::*;
 
 const PAD_FRICTION: f32 = 1.0;
-/// A finger and its share of the drive's inertia. Light fingers between stiff contacts let what they hold creep.
-const FINGER_KG: f32 = 0.2;
-const STIFFNESS: f32 = 20_000.0;
+/// A finger and its share of the drive's inertia. Light fingers between stiff contacts let what they hold creep: with half
+/// of this it creeps twice as far.
+const FINGER_KG: f32 = 0.4;
+const STIFFNESS: f32 = 8_000.0;
 const DAMPING: f32 = 40.0;
 /// Speed of each finger, metres per second.
 const SPEED: f64 = 0.1;
@@ -20,14 +21,14 @@ const SPEED: f64 = 0.1;
 /// The fingers' bodies and joints in the engine.
 #[derive(Debug, Clone)]
 pub(crate) struct Fingers {
-    fingers: [RigidBodyHandle; 2],
+    pub(super) fingers: [RigidBodyHandle; 2],
     /// The finger's colliders, +y side first: the pads.
     pub(crate) pads: [ColliderHandle; 2],
     joints: [ImpulseJointHandle; 2],
     max_opening_m: f64,
     max_force_n: f64,
     /// Where the fingers' controller is on its way to the commanded opening, metres each finger has closed.
-    setpoint: f64,
+    pub(super) setpoint: f64,
 }
 
 impl Fingers {

@@ -14,6 +14,7 @@ use acm_concept::{
 };
 use glam::DVec3;
 use rapier3d::prelude::*;
+use serde::{Deserialize, Serialize};
 
 /// A link that is pressed harder than this stops the arm, newtons.
 const MOST_N: f32 = 60.0;
@@ -29,8 +30,8 @@ pub(crate) struct Links {
 }
 
 /// How a link meets its surroundings: how hard it is pressed, newtons, and how deep it is in what stands fast, metres.
-#[derive(Debug, Clone, Copy, Default)]
-struct Press {
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
+pub(super) struct Press {
     force: f32,
     depth: f32,
 }
@@ -45,6 +46,20 @@ struct Part {
 }
 
 impl Links {
+    /// The engine's bodies.
+    pub(super) fn bodies(&self) -> impl Iterator<Item = RigidBodyHandle> {
+        self.parts.iter().map(|part| part.body)
+    }
+    /// How every link met its surroundings after the last step: all that they change while the world runs.
+    pub(super) fn state(&self) -> Vec<Press> {
+        self.parts.iter().map(|part| part.last).collect()
+    }
+    pub(super) fn set_state(&mut self, state: Vec<Press>) {
+        for (part, last) in self.parts.iter_mut().zip(state) {
+            part.last = last;
+        }
+    }
+
     pub(crate) fn build(world: &mut PhysicsWorld, arm: &ArmDescription) -> Links {
         let frames = arm.frames(&arm.home);
         let all_but_the_robot = Group::ALL.difference(FINGERS).difference(HANDS).difference(LINKS);

@@ -5,12 +5,17 @@ mod cup;
 mod fingers;
 mod limits;
 mod links;
+mod state;
 mod wrist;
 
 pub use catalogue::RobotError;
 pub(crate) use catalogue::{RobotModel, TICK_S, open};
+pub(crate) use state::RobotState;
 
-use crate::contact::{Contacts, TickForces};
+use crate::{
+    audit,
+    contact::{Contacts, TickForces},
+};
 use acm_concept::{
     arm::Joints,
     embodiment::{Command, Feedback, RobotDescription},
@@ -22,7 +27,8 @@ use cup::Cup;
 use fingers::Fingers;
 use glam::DVec3;
 use links::Links;
-use rapier3d::prelude::{ColliderHandle, PhysicsWorld};
+use rapier3d::prelude::{ColliderHandle, PhysicsWorld, RigidBodyHandle};
+use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 use wrist::Wrist;
 
@@ -60,14 +66,14 @@ struct Limb {
 }
 
 /// A commanded configuration.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct Aim {
     tcp: Pose,
     joints: Option<Joints>,
 }
 
 /// What the hand is to do.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct Grip {
     opening_m: f64,
     force_n: f64,
@@ -161,6 +167,29 @@ impl Robot {
             Hand::Cup(_) => f64::from(u8::from(!limb.grip.vacuum)),
         };
         self.limbs.get(self.active).map_or(1.0, share)
+    }
+
+    /// All its bodies.
+    pub(crate) fn bodies(&self) -> Vec<RigidBodyHandle> {
+        let of = |limb: &Limb| {
+            let fingers = if let Hand::Fingers(fingers) = &limb.hand { fingers.fingers.to_vec() } else { Vec::new() };
+            let links: Vec<_> = limb.links.iter().flat_map(Links::bodies).collect();
+            [vec![limb.wrist.follow, limb.wrist.hand], fingers, links].concat()
+        };
+        self.limbs.iter().flat_map(of).collect()
+    }
+
+    /// What the physics audit looks at: where the hands are, what their pads feel, and what they can.
+    pub(crate) fn hands<'a>(&'a self, world: &'a PhysicsWorld) -> impl Iterator<Item = audit::Hand> + 'a {
+        self.limbs.iter().map(|limb| {
+            let tcp = limb.wrist.tcp(world);
+            audit::Hand {
+                at: tcp.translation,
+                pads_n: limb.forces.mean().0.map(|force| tcp.inverse().transform_vector(force)),
+                max_speed_m_s: limb.robot.max_speed_m_s,
+                max_grip_n: limb.robot.max_grip_force_n,
+            }
+        })
     }
 
     /// What touches things on purpose, arm by arm.

@@ -25,7 +25,7 @@ pub(crate) const HANDS: Group = Group::GROUP_4;
 /// The hand's body and what pulls it.
 #[derive(Debug, Clone)]
 pub(crate) struct Wrist {
-    follow: RigidBodyHandle,
+    pub(super) follow: RigidBodyHandle,
     pub(crate) hand: RigidBodyHandle,
 }
 

@@ -365,6 +365,8 @@ impl<'a> Meaning<'a> {
             on: on.transpose()?,
             scale: raw.scale.as_ref().map(|scale| self.triple(&field, scale, &names)).transpose()?,
             hue_deg: raw.hue_deg.as_ref().map(|hue| self.number(&field, hue, &names)).transpose()?,
+            density_kg_m3: raw.density_kg_m3.as_ref().map(|kg| self.number(&field, kg, &names)).transpose()?,
+            friction: raw.friction.as_ref().map(|mu| self.number(&field, mu, &names)).transpose()?,
             perturb: raw.perturb,
         })
     }

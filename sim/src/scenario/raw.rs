@@ -391,6 +391,12 @@ pub(crate) struct RawObject {
     /// model's own.
     #[serde(default)]
     pub(crate) hue_deg: Option<Number>,
+    /// Density of its solids instead of the model's, kg/m3, 1 to 25000.
+    #[serde(default)]
+    pub(crate) density_kg_m3: Option<Number>,
+    /// Coulomb friction of its surface instead of the model's, 0 to 2.
+    #[serde(default)]
+    pub(crate) friction: Option<Number>,
     /// Deviations of single copies from the model, drawn from a stream of their own.
     #[serde(default)]
     pub(crate) perturb: Option<RawPerturb>,

@@ -117,6 +117,8 @@ pub(crate) struct ObjectSpec {
     pub(crate) on: Option<Reference>,
     pub(crate) scale: Option<[Expression; 3]>,
     pub(crate) hue_deg: Option<Expression>,
+    pub(crate) density_kg_m3: Option<Expression>,
+    pub(crate) friction: Option<Expression>,
     pub(crate) perturb: Option<RawPerturb>,
 }
 

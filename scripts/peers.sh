@@ -1,0 +1,11 @@
+#!/usr/bin/env bash
+# Installs what `acm bench world` compares with, in a Python environment of its own. Nothing else needs it; without it
+# those rows say that they are skipped.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+readonly folder=${CARGO_TARGET_DIR:-target}/peers list=scripts/peers/requirements.txt
+cmp -s "$list" "$folder/installed.txt" && exit
+python3 -m venv --clear "$folder"
+"$folder/bin/python" -m pip install --quiet --disable-pip-version-check --requirement "$list"
+cp "$list" "$folder/installed.txt"
+printf 'peers: installed in %s\n' "$folder"
