@@ -20,7 +20,7 @@ impl Meaning<'_> {
     pub(super) fn fluent(&self, raw: &RawFluent) -> Result<FluentSpec, ScenarioError> {
         let field = format!("fluent `{}`", raw.name);
         let (low, high) = (raw.low.unwrap_or(f64::NEG_INFINITY), raw.high.unwrap_or(f64::INFINITY));
-        if !(low < high) {
+        if low.is_nan() || high.is_nan() || low >= high {
             return Err(self.wrong(field, format!("low = {low} must be less than high = {high}")));
         }
         let variables = self.variables();
