@@ -348,8 +348,8 @@ fn liar(change: (&str, &str), then: &'static [&'static str]) -> (tempfile::TempD
     (dir, Address::Unix(path))
 }
 
-const JOINT: &str = r#"[{"name":"elbow","frame":{"translation":[0,0,0],"rotation":[0,0,0,1]},"axis":[0,0,1],"min_rad":-2,
-    "max_rad":2,"max_speed_rad_s":1,"max_acceleration_rad_s2":1,"max_torque_nm":1}]"#;
+const JOINT: &str = r#"{"name":"elbow","frame":{"translation":[0,0,0],"rotation":[0,0,0,1]},"axis":[0,0,1],"min_rad":-2,
+    "max_rad":2,"max_speed_rad_s":1,"max_acceleration_rad_s2":1,"max_torque_nm":1}"#;
 
 /// The fields of a robot that say that it has an arm.
 fn arm(home: &str, joints: &str) -> String {
@@ -361,7 +361,7 @@ fn arm(home: &str, joints: &str) -> String {
 
 #[test]
 fn what_a_host_tells_of_itself_is_checked() {
-    let second = serde_json::to_string(description()).unwrap();
+    let (second, two) = (serde_json::to_string(description()).unwrap(), format!("[{JOINT},{JOINT}]"));
     for (from, to, part) in [
         (r#""protocol":1"#, r#""protocol":2"#, "version 2"),
         (r#""width":32"#, r#""width":4000000000"#, "intrinsics"),
@@ -371,8 +371,8 @@ fn what_a_host_tells_of_itself_is_checked() {
         (r#""answer":"hello""#, r#""answer":"stopped""#, "stopped to hello"),
         (r#""robot""#, r#""rowboat""#, "missing field `robot`"),
         (r#""tick_s":0.02"#, &arm("[0.0]", "[]"), "an arm of 0 joints with 1 home positions"),
-        (r#""tick_s":0.02"#, &arm("[3.0]", JOINT), "an arm's home is beyond its limits: elbow at 3.0000 rad"),
-        (r#""tick_s":0.02"#, &arm("[1.0]", JOINT), "its feedback has 0 joints for the 1 of arm 0"),
+        (r#""tick_s":0.02"#, &arm("[3.0]", &format!("[{JOINT}]")), "an arm's home is beyond its limits: elbow at 3.0000 rad"),
+        (r#""tick_s":0.02"#, &arm("[1.0,1.0]", &two), "its feedback has 1 joints for the 2 of arm 0"),
         (r#""tick_s":0.02"#, &format!(r#""tick_s":0.02,"others":[{second}]"#), "its feedback says nothing of arm 1"),
     ] {
         let (_dir, address) = liar((from, to), &[]);

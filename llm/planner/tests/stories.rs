@@ -375,7 +375,9 @@ fn binding_gives_the_controller_perceived_geometry() {
     assert!((pick.frame.translation.z - (world::TABLE_Z + 0.001 + 0.02)).abs() < 1e-9, "{}", pick.frame.translation);
     assert!((pick.arguments["grip_width"] - 0.04).abs() < 1e-12 && pick.held.is_none());
     assert!((pick.support_height_m - (world::TABLE_Z + 0.001)).abs() < 1e-9);
-    assert_eq!(pick.obstacles.len(), 4, "three mats and a button");
+    let others = pick.obstacles.iter().filter(|(id, _)| *id != pick.part.object);
+    assert_eq!(others.count(), 4, "three mats and a button");
+    assert_eq!(pick.obstacles.len(), 5, "and the cube itself, which the arm must not hit");
     assert_eq!(place.held.as_ref().unwrap().0, ObjectId(4));
     assert!((place.support_height_m - world::TABLE_Z).abs() < 1e-9, "the middle is bare table");
     assert!((last.support_height_m - (world::TABLE_Z + 0.001)).abs() < 1e-9, "the mat's top");
