@@ -19,7 +19,7 @@ const GIVE: f64 = 2e-4;
 /// What follows another joint or an expression is pulled with this stiffness, damping and force: hinge, slider.
 const FOLLOW: [[f64; 3]; 2] = [[20.0, 1.0, 5.0], [5000.0, 100.0, 50.0]];
 /// Most that what acts along a joint changes its speed in a substep: hinge, slider.
-const CHANGE: [f64; 2] = [2.0, 0.1];
+const CHANGE: [f64; 2] = [0.5, 0.1];
 /// Share of a latch's or detent's reach in which its force rises to the full one.
 const RISE: f64 = 0.25;
 
@@ -111,7 +111,7 @@ impl Articulation {
 
     /// What is added to the inertia of what hangs on it: kg m2 for a hinge, kg for a slider. Where friction could stop a
     /// light knob a hundred times in a substep, the solver would make it chatter; with this the joint changes its speed
-    /// by 2 rad/s or 0.1 m/s at most.
+    /// by 0.5 rad/s or 0.1 m/s at most.
     pub(crate) fn armature(joint: &Joint, world: &PhysicsWorld) -> f64 {
         let parameters = &world.integration_parameters;
         let substep_s = f64::from(parameters.dt) / parameters.num_solver_iterations as f64;
