@@ -371,7 +371,11 @@ fn what_a_host_tells_of_itself_is_checked() {
         (r#""answer":"hello""#, r#""answer":"stopped""#, "stopped to hello"),
         (r#""robot""#, r#""rowboat""#, "missing field `robot`"),
         (r#""tick_s":0.02"#, &arm("[0.0]", "[]"), "an arm of 0 joints with 1 home positions"),
-        (r#""tick_s":0.02"#, &arm("[3.0]", &format!("[{JOINT}]")), "an arm's home is beyond its limits: elbow at 3.0000 rad"),
+        (
+            r#""tick_s":0.02"#,
+            &arm("[3.0]", &format!("[{JOINT}]")),
+            "an arm's home is beyond its limits: elbow at 3.0000 rad",
+        ),
         (r#""tick_s":0.02"#, &arm("[1.0,1.0]", &two), "its feedback has 1 joints for the 2 of arm 0"),
         (r#""tick_s":0.02"#, &format!(r#""tick_s":0.02,"others":[{second}]"#), "its feedback says nothing of arm 1"),
     ] {

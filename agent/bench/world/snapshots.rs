@@ -133,8 +133,8 @@ fn episode(scenario: &Scenario, seed: u64, renderer: Option<&SharedRenderer>) ->
     for number in (0..points.len()).rev() {
         let point = &points[number];
         second.simulation.restore(&Snapshot::from_bytes(point.snapshot.as_bytes().to_vec())?)?;
-        for tick in point.tick..point.tick + GO_ON {
-            second.robot.command(&commands[tick])?;
+        for (tick, command) in commands.iter().enumerate().skip(point.tick).take(GO_ON) {
+            second.robot.command(command)?;
             // The first time, frames were taken at other points on the way.
             let others =
                 points.iter().enumerate().filter(|(other, at)| *other != number && at.tick + GO_ON == tick + 1);

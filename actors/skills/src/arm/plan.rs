@@ -100,10 +100,10 @@ fn shorten(scene: &Scene, mut way: Vec<Joints>, margin_m: f64, rng: &mut ChaCha8
         }
         let from = rng.random_range(0..way.len() - 2);
         let to = rng.random_range(from + 2..way.len());
-        if let (Some(a), Some(b)) = (way.get(from), way.get(to)) {
-            if is_clear_between(scene, a, b, margin_m) {
-                way.drain(from + 1..to);
-            }
+        if let (Some(a), Some(b)) = (way.get(from), way.get(to))
+            && is_clear_between(scene, a, b, margin_m)
+        {
+            way.drain(from + 1..to);
         }
     }
     way
