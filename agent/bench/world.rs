@@ -14,7 +14,7 @@
 //!
 //! A module has one function `measure(args, result)` that adds rows and figures to the [`BenchResult`]; [`measure`]
 //! calls one after the other. What this machine cannot do is a row that says why. An episode that a module plays is
-//! counted with [`audited`]: the physics audit holds for all of them.
+//! counted with `audited`: the physics audit holds for all of them.
 
 pub mod articulated;
 pub mod blocks;
