@@ -25,6 +25,9 @@ const MAX_STEPS: u32 = 60;
 /// How far before the goal a way may come to it from, metres.
 const VIA_M: [f64; 2] = [0.15, 0.35];
 
+/// Tilts of the hand about the direction in which its fingers close that are tried, radians.
+pub(crate) const TILTS: [f64; 5] = [0.0, 0.35, -0.35, 0.7, -0.7];
+
 /// The TCP pose that acts at a frame: the approach direction goes against the frame's z axis, which points out of the
 /// part, and the fingers close along its y axis.
 pub(crate) fn facing(frame: &Pose) -> Pose {

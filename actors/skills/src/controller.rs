@@ -2,7 +2,10 @@
 
 use crate::{
     arm::choice::choose,
-    functions::*,
+    functions::{
+        articulated::{HINGED, Jointed, SLIDING},
+        *,
+    },
     hand::Hand,
     run::{Function, Run},
     sequence::Sequence,
@@ -124,11 +127,8 @@ const KINDS: &[(&str, Start)] = &[
         true => Ok(run(i, suck_from_above::SuckFromAbove::plan(i, &h, f)?, h)),
         false => Ok(run(i, grasp_from_above::GraspFromAbove::plan(i, &h, f)?, h)),
     }),
-    ("hinge-close", |i, h, _| match i.arguments.contains_key("grip_width") {
-        true => Ok(run(i, Sequence::new(hinge_close::draw(i, &h)?), h)),
-        false => Ok(run(i, Sequence::new(hinge_close::push(i, &h)?), h)),
-    }),
-    ("hinge-open", |i, h, _| Ok(run(i, Sequence::new(hinge_open::plan(i, &h)?), h))),
+    ("hinge-close", |i, h, _| close_it(i, h, HINGED)),
+    ("hinge-open", |i, h, _| Ok(run(i, Sequence::new(open::plan(i, &h, HINGED)?), h))),
     ("insert-along", |i, h, f| Ok(run(i, Sequence::new(insert_along::InsertAlong::plan(i, &h, f)?), h))),
     ("move-to", |i, h, _| Ok(run(i, Sequence::new(move_to::plan(i, &h)?), h))),
     ("place-upright", |i, h, f| Ok(run(i, place_upright::PlaceUpright::plan(i, &h, f)?, h))),
@@ -139,13 +139,18 @@ const KINDS: &[(&str, Start)] = &[
     ("reach", |i, h, _| Ok(run(i, Sequence::new(reach::Reach::plan(i, &h)?), h))),
     ("release", |i, h, _| Ok(run(i, Sequence::new(release::Release::plan(i)?), h))),
     ("rotate", |i, h, _| Ok(run(i, Sequence::new(rotate::plan(i, &h)?), h))),
-    ("slide-close", |i, h, _| match i.arguments.contains_key("grip_width") {
-        true => Ok(run(i, Sequence::new(slide_close::draw(i, &h)?), h)),
-        false => Ok(run(i, Sequence::new(slide_close::push(i, &h)?), h)),
-    }),
-    ("slide-open", |i, h, _| Ok(run(i, Sequence::new(slide_open::plan(i, &h)?), h))),
+    ("slide-close", |i, h, _| close_it(i, h, SLIDING)),
+    ("slide-open", |i, h, _| Ok(run(i, Sequence::new(open::plan(i, &h, SLIDING)?), h))),
     ("turn", |i, h, _| Ok(run(i, Sequence::new(turn::plan(i, &h)?), h))),
 ];
+
+/// By its handle where there is one to take, else by a push from outside.
+fn close_it(invocation: &SkillInvocation, hand: Hand, jointed: Jointed) -> Result<Box<dyn Controller>, StartError> {
+    match invocation.arguments.contains_key("grip_width") {
+        true => Ok(run(invocation, Sequence::new(close::draw(invocation, &hand, jointed)?), hand)),
+        false => Ok(run(invocation, Sequence::new(close::push(invocation, &hand, jointed)?), hand)),
+    }
+}
 
 fn run(invocation: &SkillInvocation, function: impl Function + 'static, hand: Hand) -> Box<dyn Controller> {
     Box::new(Run::new(invocation, hand, function))

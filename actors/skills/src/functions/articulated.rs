@@ -2,7 +2,7 @@
 
 use super::{PERCEPTION_ERROR_M, ROOMY_M, argument, ending, number};
 use crate::{
-    approach::{Surroundings, choose, drawn_back, facing, tilted, turned_about, way},
+    approach::{Surroundings, TILTS, choose, drawn_back, facing, tilted, turned_about, way},
     articulation::Articulation,
     controller::StartError,
     hand::Hand,
@@ -24,8 +24,6 @@ use glam::DVec3;
 const SPREAD_M: f64 = 0.03;
 /// The least spread a part must leave, metres.
 const LEAST_SPREAD_M: f64 = 0.008;
-/// Tilts of the hand about the direction in which its fingers close that are tried, radians.
-const TILTS: [f64; 5] = [0.0, 0.35, -0.35, 0.7, -0.7];
 /// Distance from the part at which the hand comes to rest before it goes to it, metres.
 const STANDOFF_M: f64 = 0.06;
 /// The last stretch before that, which goes straight on, metres.
@@ -43,6 +41,17 @@ const LACK_SHARE: f64 = 0.06;
 const LACK: f64 = 0.01;
 /// A part that was felt all the way surely is where the hand left it.
 const FELT_CONFIDENCE: f64 = 0.92;
+
+/// What parts on a hinge and parts on a slide differ in.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Jointed {
+    /// The argument that says how far the part moves.
+    pub travel: &'static str,
+    /// Direction of the joint's axis in the frame where no argument gives one.
+    pub axis: DVec3,
+}
+pub(crate) const HINGED: Jointed = Jointed { travel: "angle", axis: DVec3::X };
+pub(crate) const SLIDING: Jointed = Jointed { travel: "travel", axis: DVec3::Z };
 
 /// The joint that an invocation describes in the function's frame: a line along `axis_*` if there is no `hinge_*`.
 pub(crate) fn joint(invocation: &SkillInvocation, default_axis: DVec3) -> Articulation {

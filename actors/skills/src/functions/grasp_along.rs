@@ -6,7 +6,7 @@
 
 use super::{PERCEPTION_ERROR_M, ROOMY_M, argument, articulated::surroundings, number, require_empty_hand};
 use crate::{
-    approach::{Surroundings, choose, drawn_back, facing, tilted, turned_about, way},
+    approach::{Surroundings, TILTS, choose, drawn_back, facing, tilted, turned_about, way},
     clearance::SAFETY_M,
     controller::StartError,
     hand::Hand,
@@ -27,8 +27,6 @@ use std::f64::consts::TAU;
 /// How much wider than the thing the fingers are on the way to it, and the least; metres.
 const SPREAD_M: f64 = 0.03;
 const LEAST_SPREAD_M: f64 = 0.008;
-/// Tilts about the closing direction that are tried, radians.
-const TILTS: [f64; 5] = [0.0, 0.35, -0.35, 0.7, -0.7];
 /// Sides of a round thing that are tried.
 const ROUND_SIDES: u32 = 8;
 /// Distance at which the hand comes to rest before it goes to the thing, metres.

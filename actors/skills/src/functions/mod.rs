@@ -1,16 +1,16 @@
 //! The function kinds: manipulation functions as sequences of primitives.
 
-mod articulated;
+pub(crate) mod articulated;
 mod ending;
 mod held;
 
+pub(crate) mod close;
 pub(crate) mod flip;
 pub(crate) mod grasp_along;
 pub(crate) mod grasp_from_above;
-pub(crate) mod hinge_close;
-pub(crate) mod hinge_open;
 pub(crate) mod insert_along;
 pub(crate) mod move_to;
+pub(crate) mod open;
 pub(crate) mod place_upright;
 pub(crate) mod press;
 pub(crate) mod press_down;
@@ -19,8 +19,6 @@ pub(crate) mod push_along;
 pub(crate) mod reach;
 pub(crate) mod release;
 pub(crate) mod rotate;
-pub(crate) mod slide_close;
-pub(crate) mod slide_open;
 pub(crate) mod suck_from_above;
 pub(crate) mod turn;
 

@@ -5,7 +5,7 @@
 
 use super::{PERCEPTION_ERROR_M, ROOMY_M, argument, articulated::surroundings, number};
 use crate::{
-    approach::{Surroundings, choose, facing, tilted, turned_about, way},
+    approach::{Surroundings, TILTS, choose, facing, tilted, turned_about, way},
     controller::StartError,
     hand::Hand,
     motion::Pace,
@@ -15,9 +15,6 @@ use crate::{
 };
 use acm_concept::{ids::ObjectId, pose::Pose, skill::SkillInvocation};
 use glam::DVec3;
-
-/// Tilts about the closing direction that are tried where the straight way is not free, radians.
-const TILTS: [f64; 5] = [0.0, 0.35, -0.35, 0.7, -0.7];
 
 /// The running function.
 pub(crate) struct Reach {
