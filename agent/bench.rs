@@ -12,7 +12,7 @@ pub mod runtime;
 pub mod targets;
 pub mod world;
 
-use crate::cli::{BenchArgs, BenchCommand, Exit};
+use crate::cli::{BenchArgs, BenchCommand, Exit, WorldArgs};
 use anyhow::Context;
 use serde::Serialize;
 use std::{
@@ -133,17 +133,20 @@ impl BenchResult {
 
 /// Runs `acm bench`. It ends with 1 if a figure misses its floor.
 pub fn run(command: &BenchCommand) -> anyhow::Result<Exit> {
-    let (args, measure): (&BenchArgs, fn(&BenchArgs) -> anyhow::Result<BenchResult>) = match command {
-        BenchCommand::Perception(args) => (args, perception::measure),
-        BenchCommand::Runtime(args) => (args, runtime::measure),
-        BenchCommand::World(args) => (args, world::measure),
-    };
+    let (BenchCommand::Perception(args)
+    | BenchCommand::Runtime(args)
+    | BenchCommand::World(WorldArgs { common: args, .. })) = command;
     // First, so that a mistake in the file does not cost the measurement.
     let targets = match &args.against {
         Some(path) => Targets::read(path)?,
         None => Targets::own()?,
     };
-    finish(args, &targets, &measure(args)?)
+    let result = match command {
+        BenchCommand::Perception(args) => perception::measure(args),
+        BenchCommand::Runtime(args) => runtime::measure(args),
+        BenchCommand::World(args) => world::measure(args),
+    };
+    finish(args, &targets, &result?)
 }
 
 /// Prints a result beside its targets, writes it where it is asked for, and says how the process ends.

@@ -1,6 +1,6 @@
 //! The command line and its exit codes.
 
-use crate::{bench, demo, doctor, inject::Injection, perceive, run, scenario, serve, trace};
+use crate::{bench, bench::world::WorldPart, demo, doctor, inject::Injection, perceive, run, scenario, serve, trace};
 use acm_actors::{
     AgentError,
     episode::Until,
@@ -376,7 +376,7 @@ pub enum BenchCommand {
     /// Frames between processes, messages between actors, what a trace costs, how fast an actor is replaced.
     Runtime(BenchArgs),
     /// Physics beside MuJoCo, grasps, primitives, rendering, pace, physics audit, snapshots.
-    World(BenchArgs),
+    World(WorldArgs),
 }
 
 /// Arguments of every bench.
@@ -394,6 +394,17 @@ pub struct BenchArgs {
     /// Compare with the targets of this file instead of the built-in ones.
     #[arg(long, value_name = "FILE")]
     pub against: Option<PathBuf>,
+}
+
+/// Arguments of `acm bench world`.
+#[derive(Debug, Args)]
+pub struct WorldArgs {
+    /// What every bench takes.
+    #[command(flatten)]
+    pub common: BenchArgs,
+    /// Measure these parts alone, in this order.
+    #[arg(long, value_name = "PART,...", value_delimiter = ',', value_enum)]
+    pub only: Vec<WorldPart>,
 }
 
 /// Arguments of the other process of a bench.

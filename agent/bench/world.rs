@@ -28,22 +28,55 @@ pub mod rendering;
 pub mod snapshots;
 
 use super::BenchResult;
-use crate::cli::BenchArgs;
+use crate::cli::{BenchArgs, WorldArgs};
+use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressStyle};
 
-/// Measures everything.
-pub fn measure(args: &BenchArgs) -> anyhow::Result<BenchResult> {
+/// A part of the bench: what one module measures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum WorldPart {
+    /// Steps and simulated seconds a processor second, beside MuJoCo's.
+    Physics,
+    /// Pictures a processor second, beside MuJoCo's.
+    Rendering,
+    /// An episode's pace when the executor alone works.
+    Pace,
+    /// Worlds that are put back.
+    Snapshots,
+    /// Five cubes grasped, shaken, held and stacked.
+    Blocks,
+    /// The nine primitives over a table of cases.
+    Primitives,
+    /// Doors and drawers.
+    Articulated,
+}
+
+impl WorldPart {
+    fn measure(self) -> fn(&BenchArgs, &mut BenchResult) -> anyhow::Result<()> {
+        match self {
+            WorldPart::Physics => physics::measure,
+            WorldPart::Rendering => rendering::measure,
+            WorldPart::Pace => pace::measure,
+            WorldPart::Snapshots => snapshots::measure,
+            WorldPart::Blocks => blocks::measure,
+            WorldPart::Primitives => primitives::measure,
+            WorldPart::Articulated => articulated::measure,
+        }
+    }
+}
+
+/// Measures the parts that are asked for, or everything.
+pub fn measure(args: &WorldArgs) -> anyhow::Result<BenchResult> {
     let mut result = BenchResult::new("world", "d435");
     if cfg!(debug_assertions) {
         result.notes.push("This is a debug build: its times and ratios of times mean nothing.".into());
     }
-    physics::measure(args, &mut result)?;
-    rendering::measure(args, &mut result)?;
-    pace::measure(args, &mut result)?;
-    snapshots::measure(args, &mut result)?;
-    blocks::measure(args, &mut result)?;
-    primitives::measure(args, &mut result)?;
-    articulated::measure(args, &mut result)?;
+    let parts = if args.only.is_empty() { WorldPart::value_variants() } else { &args.only };
+    for (index, part) in parts.iter().enumerate() {
+        let name = part.to_possible_value().map(|value| value.get_name().to_string()).unwrap_or_default();
+        eprintln!("acm bench world: {name}, part {} of {}", index + 1, parts.len());
+        part.measure()(&args.common, &mut result)?;
+    }
     Ok(result)
 }
 

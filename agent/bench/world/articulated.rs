@@ -3,7 +3,10 @@
 //! What a person would see of a closed door is taken from the truth: the box of its handle, the flat of its front, the
 //! axis of its hinge. Everything else is the function kinds' own.
 
-use super::primitives::rig::{self, Rig, invocation};
+use super::{
+    primitives::rig::{self, Rig, invocation},
+    progress,
+};
 use crate::{
     bench::{BenchResult, Row},
     cli::BenchArgs,
@@ -78,7 +81,9 @@ pub fn measure(args: &BenchArgs, result: &mut BenchResult) -> Result<()> {
     let (mut tried, mut good) = (0usize, 0usize);
     let mut models = models(data.as_deref());
     models.truncate(args.episodes.unwrap_or(usize::MAX));
+    let bar = progress("doors and drawers", models.len() as u64);
     for model in &models {
+        bar.inc(1);
         let shared = model.starts_with(SHARED_PREFIX);
         for swing in run_model(model)? {
             tried += usize::from(shared);

@@ -4,6 +4,7 @@ pub mod rig;
 pub mod table;
 pub mod trial;
 
+use super::progress;
 use crate::{
     bench::{BenchResult, Row},
     cli::BenchArgs,
@@ -28,8 +29,10 @@ pub fn measure(args: &BenchArgs, result: &mut BenchResult) -> Result<()> {
     let table = Table::own()?;
     let seeds = args.episodes.map_or(if args.quick { QUICK_SEEDS } else { SEEDS }, |episodes| episodes as u64);
     let mut results = Vec::new();
+    let bar = progress("primitives", table.cell.len() as u64);
     for cell in &table.cell {
         let found = run_cell(&table, cell, 0..seeds)?;
+        bar.inc(1);
         let values = [
             ("right", found.right as f64),
             ("tried", found.tried as f64),
