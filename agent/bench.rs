@@ -71,6 +71,8 @@ pub struct BenchResult {
     pub rows: Vec<Row>,
     /// What a reader must know to read the figures right, one sentence each.
     pub notes: Vec<String>,
+    /// Parts that ended with an error, and which; their figures are missing.
+    pub errors: Vec<String>,
 }
 
 impl BenchResult {
@@ -86,6 +88,7 @@ impl BenchResult {
             figures: BTreeMap::new(),
             rows: Vec::new(),
             notes: Vec::new(),
+            errors: Vec::new(),
         }
     }
     /// Adds a figure.
@@ -110,6 +113,9 @@ impl BenchResult {
         for note in &self.notes {
             writeln!(out, "  {note}")?;
         }
+        for error in &self.errors {
+            writeln!(out, "  not measured: {error}")?;
+        }
         if self.figures.is_empty() {
             return Ok(());
         }
@@ -131,7 +137,7 @@ impl BenchResult {
     }
 }
 
-/// Runs `acm bench`. It ends with 1 if a figure misses its floor.
+/// Runs `acm bench`. It ends with 1 if a figure misses its floor or a part could not be measured.
 pub fn run(command: &BenchCommand) -> anyhow::Result<Exit> {
     let (BenchCommand::Perception(args)
     | BenchCommand::Runtime(args)
@@ -158,7 +164,7 @@ fn finish(args: &BenchArgs, targets: &Targets, result: &BenchResult) -> anyhow::
     let misses = |(name, value): (&String, &f64)| {
         targets.of(result.bench, name).is_some_and(|target| target.verdict(*value) == Verdict::BelowFloor)
     };
-    Ok(if result.figures.iter().any(misses) { Exit::Failed } else { Exit::Success })
+    Ok(if !result.errors.is_empty() || result.figures.iter().any(misses) { Exit::Failed } else { Exit::Success })
 }
 
 fn write_json(path: &Path, result: &BenchResult) -> anyhow::Result<()> {

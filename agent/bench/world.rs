@@ -66,6 +66,9 @@ impl WorldPart {
 }
 
 /// Measures the parts that are asked for, or everything.
+///
+/// # Errors
+/// None: a part that ends with an error is told in the result.
 pub fn measure(args: &WorldArgs) -> anyhow::Result<BenchResult> {
     let mut result = BenchResult::new("world", "d435");
     if cfg!(debug_assertions) {
@@ -75,7 +78,10 @@ pub fn measure(args: &WorldArgs) -> anyhow::Result<BenchResult> {
     for (index, part) in parts.iter().enumerate() {
         let name = part.to_possible_value().map(|value| value.get_name().to_string()).unwrap_or_default();
         eprintln!("acm bench world: {name}, part {} of {}", index + 1, parts.len());
-        part.measure()(&args.common, &mut result)?;
+        // What the other parts have measured is not lost with it.
+        if let Err(error) = part.measure()(&args.common, &mut result) {
+            result.errors.push(format!("{name}: {error:#}"));
+        }
     }
     Ok(result)
 }

@@ -160,7 +160,7 @@ mod tests {
         // A block that is put down 20 mm from where the judge wants it.
         let table = Table::parse(
             "t.toml",
-            "[[cell]]\nprimitive = 'release'\nname = 'far'\nwidth_mm = 40\ndepth_mm = 40\nheight_mm = 40\nmass_g = 50\n\
+            "[[cell]]\nprimitive = 'release'\nname = 'far'\nwidth_mm = 40\ndepth_mm = 40\nheight_mm = 40\nmass_g = 50\ndensest_kg_m3 = 11300\n\
              friction = 0.5\nx_mm = -80\ny_mm = 0\nbelieved_off_mm = 20\n",
         )
         .unwrap();

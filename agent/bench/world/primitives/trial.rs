@@ -74,7 +74,7 @@ impl Thing {
         } else {
             (format!("shape = \"box\"\nsize = [{depth}, {width}, {height}]"), width * depth * height)
         };
-        let density = 1e-3 * values.get("mass_g") / volume;
+        let density = (1e-3 * values.get("mass_g") / volume).min(values.get("densest_kg_m3"));
         format!(
             "[[model]]\nmodel = \"thing\"\nsummary = \"\"\nfixed = {fixed}\ndensity_kg_m3 = {density}\nfriction = {}\n\
              [[model.solid]]\n{solid}\nposition = [0, 0, {}]\ncolor = \"#c02020\"\n",
