@@ -76,6 +76,8 @@ pub(crate) type Form = Vec<Element>;
 pub(crate) enum FrameGoal {
     /// The object stands at the destination.
     At,
+    /// The object and the thing named in place of a destination change places.
+    Exchange,
     /// The object is held, or is not.
     Holding(bool),
     /// A function is performed on the object.

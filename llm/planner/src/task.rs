@@ -125,6 +125,13 @@ pub enum Destination {
         /// On which side; `None` for any.
         side: Option<Direction>,
     },
+    /// Where a thing stood before the two changed places. An exchange is two goals in a row, one for each.
+    Exchanged {
+        /// The thing.
+        with: ReferenceIndex,
+        /// Whether this is the first of the two.
+        first: bool,
+    },
     /// Where an object was.
     History {
         /// The object.
@@ -259,6 +266,7 @@ impl Task {
                             format!("between {} and {}", number(*first), number(*second))
                         }
                         Destination::Beside { reference, side } => format!("beside {} {side:?}", number(*reference)),
+                        Destination::Exchanged { with, .. } => format!("in place of {}", number(*with)),
                         Destination::History { object, reference } => format!("{reference:?} of {}", number(*object)),
                     };
                     format!("at({object}, {to})")
@@ -286,6 +294,7 @@ impl Task {
                     format!("{} stands between {} and {}", name(object), name(first), name(second))
                 }
                 Destination::Beside { reference, .. } => format!("{} stands beside {}", name(object), name(reference)),
+                Destination::Exchanged { with, .. } => format!("{} stands where {} stood", name(object), name(with)),
                 Destination::History { object: of, reference } => {
                     format!("{} stands {}", name(object), history_phrase(*reference, &name(of)))
                 }

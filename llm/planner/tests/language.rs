@@ -54,6 +54,25 @@ fn a_task_names_its_nouns_and_its_words() {
 }
 
 #[test]
+fn two_things_change_places_in_two_goals_that_stay_together() {
+    let swapped = ["at(#0, in place of #1)", "at(#1, in place of #0)"];
+    for text in [
+        "Swap the red cube and the blue cube.",
+        "Exchange the cube with the can.",
+        "Trade the positions of the red cube and the green one.",
+        "Please swap the places of the can and the cube.",
+        "The red cube should be swapped with the blue cube.",
+    ] {
+        assert_eq!(outline(text), swapped, "{text}");
+    }
+    let after = ["press(#0) x1", "at(#1, in place of #2)", "at(#2, in place of #1)"];
+    assert_eq!(outline("Swap the red cube and the blue cube after pressing the button."), after);
+    for text in ["Swap the cube.", "Swap the cube and the cube.", "Swap the cubes and the can."] {
+        assert!(parse(text).is_err(), "{text}");
+    }
+}
+
+#[test]
 fn an_unknown_noun_is_named_with_its_span() {
     let text = "Bring the coffee machine to the middle.";
     let error = parse(text).unwrap_err();

@@ -482,3 +482,19 @@ fn of_two_alike_the_one_that_was_moved_is_put_back() {
     let end = run(&mut world, &task("Put the cube back where it was."), &abstain(), |_, _| {});
     assert_eq!(given_up(&end).0, GiveUpCause::Identity);
 }
+
+#[test]
+fn two_cubes_change_places_by_way_of_a_free_spot() {
+    for mats in 2..=4 {
+        let mut world = World::with_mats(mats, 0);
+        let (red, on) = (ObjectId(u64::from(mats) + 1), ObjectId(2));
+        let there = world.spot(on);
+        let green = world.cube(there, GREEN, Some(on));
+        let here = world.spot(red);
+        let end = run(&mut world, &task("Swap the red cube and the green cube."), &abstain(), |_, _| {});
+        assert!(matches!(end, Decision::Done { .. }), "{end:?}");
+        assert!(world.spot(red).distance(there) < 0.005 && world.spot(green).distance(here) < 0.005);
+        assert_eq!(world.done_skills.len(), 6, "{:?}", world.done_skills);
+        assert_eq!(world.done_skills[0], format!("pick P{}.0", green.0), "it makes way first");
+    }
+}

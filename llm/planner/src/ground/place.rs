@@ -4,6 +4,8 @@ use super::{
     Grounder, MAX_DEPTH, Meant, PLACE_TOLERANCE_M, Stuck,
     geometry::{Extent, symmetry, top_centre},
     has_effect,
+    history::place_at,
+    missing,
 };
 use crate::{
     decision::GiveUpCause,
@@ -35,6 +37,7 @@ impl Grounder<'_> {
                 let place = self.remembered(*object, of.value, *reference, subtask)?;
                 Ok(Meant { value: place.value, guessed: place.guessed || of.guessed })
             }
+            Destination::Exchanged { with, first } => self.exchanged(*with, *first, moved, subtask),
             other => self.spot(other, moved, 0),
         }
     }
@@ -56,11 +59,32 @@ impl Grounder<'_> {
                 Ok(Meant { value: self.standing_at(spot, moved), guessed: a.guessed || b.guessed })
             }
             Destination::Beside { reference, side } => self.beside(*reference, *side, moved, depth),
-            Destination::History { .. } => {
+            Destination::History { .. } | Destination::Exchanged { .. } => {
                 let text = "a thing cannot be told apart by where it was once".to_owned();
                 Err(Stuck::give_up(GiveUpCause::Plan, text))
             }
         }
+    }
+
+    /// Where a thing stood when its exchange with another began: the second half of it looks one subtask farther back.
+    fn exchanged(&self, with: ReferenceIndex, first: bool, moved: ObjectId, subtask: u32) -> Result<Meant<Place>, Stuck> {
+        let (other, phrase) = (self.object(with)?, self.phrase(with));
+        if other.value == moved {
+            let text = format!("{phrase} is {moved} itself: nothing changes places with itself");
+            return Err(Stuck::give_up(GiveUpCause::Plan, text));
+        }
+        let began = if first { Some(subtask) } else { subtask.checked_sub(1) }.and_then(|since| self.began(since));
+        let stood = self.view.object(other.value).and_then(|entry| place_at(entry, began));
+        let (pose, support) = stood.ok_or_else(|| missing(other.value, phrase))?;
+        if support == Some(moved) {
+            let text = format!("{phrase} ({}) stands on {moved}: the two cannot change places", other.value);
+            return Err(Stuck::give_up(GiveUpCause::Plan, text));
+        }
+        let own_yaw = self.view.object(moved).and_then(ObjectEntry::pose).map_or(0.0, |pose| pose.yaw());
+        let carrier = support.and_then(|id| self.view.object(id));
+        let yaw = carrier.map_or(own_yaw, |carrier| self.aligned_yaw(carrier, moved));
+        let place = Place { support, pose: Pose::from_yaw(pose.translation, yaw), tolerance_m: PLACE_TOLERANCE_M };
+        Ok(Meant { value: place, guessed: other.guessed })
     }
 
     fn on(&self, reference: ReferenceIndex, moved: ObjectId, depth: u32) -> Result<Meant<Place>, Stuck> {

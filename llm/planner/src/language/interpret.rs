@@ -65,6 +65,9 @@ impl Interpretation<'_> {
         if clause.goal == FrameGoal::Nothing {
             return self.mention(clause);
         }
+        if clause.goal == FrameGoal::Exchange {
+            return self.exchange(clause, order);
+        }
         let goal = self.goal(clause)?;
         let same_but_times = |known: &Goal| match (known, &goal) {
             (Goal::Performed { function: a, object: x, .. }, Goal::Performed { function: b, object: y, .. }) => {
@@ -75,12 +78,46 @@ impl Interpretation<'_> {
         if background && self.subtasks.iter().any(|subtask| same_but_times(&subtask.goal)) {
             return Ok(());
         }
-        let subtask = Subtask { text: clause.span.of(self.text).into(), span: clause.span, goal };
-        let at = match order {
-            Order::Last => self.subtasks.len(),
-            Order::BeforeLast => self.subtasks.len().saturating_sub(1),
+        let at = self.place_in_order(order);
+        self.subtasks.insert(at, self.subtask(clause, goal));
+        Ok(())
+    }
+
+    fn subtask(&self, clause: &Clause, goal: Goal) -> Subtask {
+        Subtask { text: clause.span.of(self.text).into(), span: clause.span, goal }
+    }
+
+    /// Where the next subtask belongs. The two halves of an exchange are never parted.
+    fn place_in_order(&self, order: Order) -> usize {
+        let second_half = |subtask: &Subtask| {
+            matches!(subtask.goal, Goal::At { destination: Destination::Exchanged { first: false, .. }, .. })
         };
-        self.subtasks.insert(at, subtask);
+        let of_last = if self.subtasks.last().is_some_and(second_half) { 2 } else { 1 };
+        match order {
+            Order::Last => self.subtasks.len(),
+            Order::BeforeLast => self.subtasks.len().saturating_sub(of_last),
+        }
+    }
+
+    /// "Swap the cube and the can": each goes to where the other stood.
+    fn exchange(&mut self, clause: &Clause, order: Order) -> Result<(), ParseError> {
+        let Some(PlacePhrase { kind: PlaceKind::On(other), .. }) = &clause.place else {
+            return Err(self.unsupported(clause.span, "it does not say with what"));
+        };
+        let role = Role::Effect("at");
+        let one = match &clause.object {
+            Some(phrase) => self.reference(phrase, &role)?,
+            None => self.antecedent(clause.span, &role)?,
+        };
+        let other = self.reference(other, &role)?;
+        let group = |index: ReferenceIndex| self.references.get(index).is_some_and(|r| r.quantity == Quantity::Group);
+        if one == other || group(one) || group(other) {
+            return Err(self.unsupported(clause.span, "two things that can be told apart change places, no more"));
+        }
+        let at = self.place_in_order(order);
+        let goal = |object, with, first| Goal::At { object, destination: Destination::Exchanged { with, first } };
+        let halves = [self.subtask(clause, goal(one, other, true)), self.subtask(clause, goal(other, one, false))];
+        self.subtasks.splice(at..at, halves);
         Ok(())
     }
 
@@ -99,7 +136,7 @@ impl Interpretation<'_> {
 
     fn goal(&mut self, clause: &Clause) -> Result<Goal, ParseError> {
         let role = match &clause.goal {
-            FrameGoal::At | FrameGoal::Nothing => Role::Effect("at"),
+            FrameGoal::At | FrameGoal::Exchange | FrameGoal::Nothing => Role::Effect("at"),
             FrameGoal::Holding(_) => Role::Effect("holding"),
             FrameGoal::Performed(function) => Role::Function(function.clone()),
         };
@@ -115,7 +152,7 @@ impl Interpretation<'_> {
             FrameGoal::Performed(function) => {
                 Goal::Performed { function: function.clone(), object, times: clause.times.unwrap_or(1) }
             }
-            FrameGoal::At | FrameGoal::Nothing => {
+            FrameGoal::At | FrameGoal::Exchange | FrameGoal::Nothing => {
                 let destination = match (&clause.place, clause.history) {
                     (Some(place), _) => self.destination(place, Some(object))?,
                     (None, Some(reference)) => Destination::History { object, reference },
@@ -340,6 +377,7 @@ fn named_in(destination: &Destination) -> Vec<ReferenceIndex> {
         Destination::On { reference } | Destination::Beside { reference, .. } => vec![*reference],
         Destination::Middle { of } => of.iter().copied().collect(),
         Destination::Between { first, second } => vec![*first, *second],
+        Destination::Exchanged { with, .. } => vec![*with],
         Destination::History { object, .. } => vec![*object],
     }
 }

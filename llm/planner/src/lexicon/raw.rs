@@ -207,6 +207,7 @@ fn frame(raw: &RawFrame) -> Result<Frame, LexiconError> {
     };
     let goal = match (raw.goal.as_str(), &raw.function) {
         ("at", None) => FrameGoal::At,
+        ("exchange", None) => FrameGoal::Exchange,
         ("holding", None) => FrameGoal::Holding(true),
         ("not-holding", None) => FrameGoal::Holding(false),
         ("performed", Some(function)) => FrameGoal::Performed(function.clone()),
@@ -214,7 +215,7 @@ fn frame(raw: &RawFrame) -> Result<Frame, LexiconError> {
         ("performed", None) => return Err(wrong("has the goal `performed` and names no function")),
         _ => {
             return Err(wrong(
-                "needs one of the goals at, holding, not-holding, performed, nothing; only `performed` has a function",
+                "needs one of the goals at, exchange, holding, not-holding, performed, nothing; only `performed` has a function",
             ));
         }
     };
