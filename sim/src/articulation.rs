@@ -37,6 +37,8 @@ pub(crate) struct Articulation {
     latch: Option<ImpulseJointHandle>,
     detents: Option<ImpulseJointHandle>,
     follower: Option<ImpulseJointHandle>,
+    /// Holds everything while it is jammed; only joints that may jam have it.
+    jam: Option<ImpulseJointHandle>,
     pub(crate) position: f64,
     pub(crate) speed: f64,
     pub(crate) pressed: bool,
@@ -73,6 +75,7 @@ impl Articulation {
             latch: None,
             detents: None,
             follower: None,
+            jam: None,
             position: joint.start,
             speed: 0.0,
             pressed: false,
@@ -186,6 +189,22 @@ impl Articulation {
     fn hold(&self, force: f64, reach: f64) -> (f32, f32) {
         let stiffness = force / (RISE * reach);
         (stiffness as f32, (0.02 * stiffness) as f32)
+    }
+
+    /// Gives it what can hold it fast.
+    pub(crate) fn make_jammable(&mut self, world: &mut PhysicsWorld) {
+        let mut all = GenericJointBuilder::new(JointAxesMask::LOCKED_FIXED_AXES).contacts_enabled(false).build();
+        all.set_enabled(false);
+        self.jam = Some(world.insert_impulse_joint(self.parent, self.child, all));
+    }
+
+    /// Holds it fast where it is, or lets it go again.
+    pub(crate) fn jam(&self, world: &mut PhysicsWorld, jammed: bool) {
+        let (Some(parent), Some(child)) = (world.bodies.get(self.parent), world.bodies.get(self.child)) else { return };
+        let at = parent.position().inverse() * child.position();
+        let Some(joint) = self.jam.and_then(|handle| world.impulse_joints.get_mut(handle, true)) else { return };
+        joint.data.local_frame1 = at;
+        joint.data.set_enabled(jammed);
     }
 
     /// Sets what depends on where the joint is. `target` is where it is to follow to, if it follows anything.

@@ -111,6 +111,15 @@ impl Body {
         self.carriers[link]
     }
 
+    /// The joint of a link.
+    pub(crate) fn joint(&self, link: usize) -> Option<&Articulation> {
+        self.joints.iter().find(|(at, _)| *at == link).map(|(_, joint)| joint)
+    }
+    /// The joint of a link.
+    pub(crate) fn joint_mut(&mut self, link: usize) -> Option<&mut Articulation> {
+        self.joints.iter_mut().find(|(at, _)| *at == link).map(|(_, joint)| joint)
+    }
+
     /// Lets its mechanisms act before a physics step. `state` holds the judge's variables.
     pub(crate) fn act(&self, world: &mut PhysicsWorld, state: &[f64]) {
         let position = |link: usize| self.joints.iter().find(|(at, _)| *at == link).map_or(0.0, |(_, j)| j.position);

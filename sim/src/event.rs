@@ -1,5 +1,5 @@
 //! What third parties do: they carry objects from place to place, whether a camera sees it or not, stand before
-//! cameras, and stop them.
+//! cameras, stop them, and jam joints.
 
 use crate::{
     body::Body,
@@ -28,6 +28,7 @@ enum Deed {
     Carry { body: usize, to: Pose, lift_m: f64 },
     Cover { cameras: Vec<usize> },
     Freeze { cameras: Vec<usize> },
+    Jam { body: usize, link: usize },
 }
 
 /// How far an event has come: all that it changes while the world runs.
@@ -55,6 +56,10 @@ pub(crate) fn build(spec: &WorldSpec, layout: &Layout, variables: &[String]) -> 
             }
             DeedSpec::Cover { cameras } => Deed::Cover { cameras: cameras.clone() },
             DeedSpec::Freeze { cameras } => Deed::Freeze { cameras: cameras.clone() },
+            DeedSpec::Jam { object, link } => {
+                let body = layout.objects.iter().position(|placed| placed.name == *object).unwrap_or_default();
+                Deed::Jam { body, link: *link }
+            }
         };
         let when = event.when.as_ref().map(|when| Watch::new(when, variables));
         Ok(Event { when, after_s: event.after_s, over_s: event.over_s, deed, phase: Phase::Waiting })
@@ -63,6 +68,15 @@ pub(crate) fn build(spec: &WorldSpec, layout: &Layout, variables: &[String]) -> 
 }
 
 impl Event {
+    /// Makes the world ready for what it may do.
+    pub(crate) fn prepare(&self, world: &mut PhysicsWorld, bodies: &mut [Body]) {
+        if let Deed::Jam { body, link } = self.deed
+            && let Some(joint) = bodies.get_mut(body).and_then(|body| body.joint_mut(link))
+        {
+            joint.make_jammable(world);
+        }
+    }
+
     /// Goes on by one physics step.
     pub(crate) fn step(&mut self, world: &mut PhysicsWorld, bodies: &mut [Body], state: &[f64], now_s: f64) {
         self.phase = match self.phase {
@@ -94,13 +108,23 @@ impl Event {
 impl Deed {
     /// Takes what is carried; says where it was.
     fn begin(&self, world: &mut PhysicsWorld, bodies: &[Body]) -> Pose {
-        let Deed::Carry { body, .. } = self else { return Pose::IDENTITY };
-        let Some(body) = bodies.get(*body) else { return Pose::IDENTITY };
-        take(world, body, true);
-        body.pose(world)
+        match self {
+            Deed::Carry { body, .. } => bodies.get(*body).map_or(Pose::IDENTITY, |body| {
+                take(world, body, true);
+                body.pose(world)
+            }),
+            Deed::Jam { .. } => {
+                self.jam(world, bodies, true);
+                Pose::IDENTITY
+            }
+            Deed::Cover { .. } | Deed::Freeze { .. } => Pose::IDENTITY,
+        }
     }
 
     fn go_on(&self, world: &mut PhysicsWorld, bodies: &[Body], from: &Pose, share: f64) {
+        if share >= 1.0 {
+            self.jam(world, bodies, false);
+        }
         let Deed::Carry { body, to, lift_m } = self else { return };
         let Some(body) = bodies.get(*body) else { return };
         if share < 1.0 {
@@ -108,6 +132,14 @@ impl Deed {
         }
         take(world, body, false);
         put(world, body, to);
+    }
+
+    fn jam(&self, world: &mut PhysicsWorld, bodies: &[Body], jammed: bool) {
+        if let Deed::Jam { body, link } = self
+            && let Some(joint) = bodies.get(*body).and_then(|body| body.joint(*link))
+        {
+            joint.jam(world, jammed);
+        }
     }
 }
 

@@ -14,7 +14,7 @@
 //! | `oracle`, `state` | the judge and its variables |
 //! | `audit` | whether whatever happened had a cause |
 //! | `snapshot` | all of it as bytes, and back |
-//! | `episode`, `scene`, `truth`, `report` | the handles, the picture, the truth, what is reported |
+//! | `episode`, `scene`, `texture`, `truth`, `report` | the handles, the picture, the truth, what is reported |
 //!
 //! Conventions: metres, seconds, newtons; world frame with z up; an object's base frame is the middle of its bottom.
 //! The world advances only when the robot is commanded or the clock waits.
@@ -46,6 +46,7 @@ mod snapshot;
 mod state;
 #[cfg(test)]
 mod testbed;
+mod texture;
 mod truth;
 mod world;
 

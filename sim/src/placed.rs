@@ -9,8 +9,10 @@ use crate::{
     },
     random::Scope,
     scenario::{ObjectSpec, RawPerturb},
+    texture::{self, with_hue},
 };
 use acm_concept::{expression::Expression, pose::Pose, solid::Solid};
+use acm_render::Pattern;
 use glam::DVec3;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -31,6 +33,8 @@ pub(crate) struct Placed {
     pub(crate) passing: Vec<(usize, usize)>,
     /// Of its base frame.
     pub(crate) pose: Pose,
+    /// What is painted over its colours.
+    pub(crate) texture: Option<Pattern>,
 }
 
 impl Placed {
@@ -68,6 +72,7 @@ impl Placed {
             links,
             passing: spec.model.passing.clone(),
             pose,
+            texture: make.texture,
         };
         object.stand_on_base();
         object
@@ -158,6 +163,7 @@ pub(crate) fn solids_at(object: &Placed, pose: &Pose) -> Vec<(Pose, SharedShape)
 pub(crate) struct Make {
     scale: DVec3,
     hue_deg: Option<f64>,
+    texture: Option<Pattern>,
     density_kg_m3: Option<f64>,
     friction: Option<f64>,
     /// Links, and where their joints start.
@@ -210,7 +216,8 @@ impl Make {
         }
         let density_kg_m3 = within(&spec.name, "density_kg_m3", spec.density_kg_m3.as_ref(), DENSITIES, scope)?;
         let friction = within(&spec.name, "friction", spec.friction.as_ref(), FRICTIONS, scope)?;
-        Ok(Make { scale, hue_deg, density_kg_m3, friction, starts })
+        let texture = texture::chosen(&spec.name, &spec.textures, scope)?;
+        Ok(Make { scale, hue_deg, texture, density_kg_m3, friction, starts })
     }
 
     /// What a link weighs.
@@ -230,17 +237,6 @@ impl Make {
         }
         piece
     }
-}
-
-/// The colour with another hue, its saturation and brightness (HSV) kept: greys stay grey.
-fn with_hue(color: [u8; 3], hue_deg: f64) -> [u8; 3] {
-    let [high, low] = [f64::from(color.into_iter().fold(0, u8::max)), f64::from(color.into_iter().fold(255, u8::min))];
-    let channel = |offset: f64| {
-        let sector = (offset + hue_deg.rem_euclid(360.0) / 60.0) % 6.0;
-        let share = sector.min(4.0 - sector).clamp(0.0, 1.0);
-        (high - (high - low) * share).round() as u8
-    };
-    [channel(5.0), channel(3.0), channel(1.0)]
 }
 
 /// How much each edge grows and how wide the bevel is. Three numbers are always drawn, so that one object's share

@@ -45,7 +45,9 @@ impl Stage {
         for (index, (_, surface)) in world.surfaces.iter().enumerate() {
             let solid = Solid::Box { size: surface.size };
             let pose = Pose::from_translation(surface.position);
-            scene.instances.push(self.instance(&solid, pose, surface.color.0, ids.surface(index)));
+            let pattern = world.textures.get(index).copied().flatten();
+            let material = Material { color: surface.color.0, pattern };
+            scene.instances.push(self.instance(&solid, pose, material, ids.surface(index)));
         }
         for (index, body) in world.bodies.iter().enumerate() {
             let poses: Vec<Pose> =
@@ -53,7 +55,10 @@ impl Stage {
             for (link, place, piece) in pieces(body.placed.links.iter().map(|link| &link.pieces)) {
                 if piece.shown {
                     let color = body.color(piece, &world.state);
-                    self.add_piece(&mut scene, [index, link, place], piece, poses[link], color, ids.object(index));
+                    // What a lamp shows is not painted over.
+                    let pattern = body.placed.texture.filter(|_| piece.lamp.is_none());
+                    let material = Material { color, pattern };
+                    self.add_piece(&mut scene, [index, link, place], piece, poses[link], material, ids.object(index));
                 }
             }
         }
@@ -64,20 +69,19 @@ impl Stage {
     fn add_robot(&self, world: &World, scene: &mut Scene, id: u32) {
         for (part, is_finger) in world.robot.seen(&world.physics) {
             let color = if is_finger { FINGER_COLOR } else { HAND_COLOR };
-            scene.instances.push(self.instance(&part.solid, part.pose, color, id));
+            scene.instances.push(self.instance(&part.solid, part.pose, Material::plain(color), id));
         }
     }
 
-    fn add_piece(&self, scene: &mut Scene, at: [usize; 3], piece: &Piece, link: Pose, color: [u8; 3], id: u32) {
+    fn add_piece(&self, scene: &mut Scene, at: [usize; 3], piece: &Piece, link: Pose, material: Material, id: u32) {
         let pose = link * piece.pose;
-        let material = Material::plain(color);
         let mut add = |mesh: &Arc<Mesh>, pose: Pose, scale: DVec3| {
             scene.instances.push(Instance { mesh: mesh.clone(), pose, scale, material, id });
         };
         match &piece.shape {
             Shape::Solid(solid) => match self.bevelled.iter().find(|(known, _)| *known == at) {
                 Some((_, mesh)) => add(mesh, pose, DVec3::ONE),
-                None => scene.instances.push(self.instance(solid, pose, color, id)),
+                None => scene.instances.push(self.instance(solid, pose, material, id)),
             },
             Shape::Capsule { radius, height } => {
                 add(&self.cylinder, pose, DVec3::new(*radius, *radius, *height));
@@ -92,12 +96,12 @@ impl Stage {
         }
     }
 
-    fn instance(&self, solid: &Solid, pose: Pose, color: [u8; 3], id: u32) -> Instance {
+    fn instance(&self, solid: &Solid, pose: Pose, material: Material, id: u32) -> Instance {
         let (mesh, scale) = match *solid {
             Solid::Box { size } => (&self.cuboid, size),
             Solid::Cylinder { radius, height } => (&self.cylinder, DVec3::new(radius, radius, height)),
         };
-        Instance { mesh: mesh.clone(), pose, scale, material: Material::plain(color), id }
+        Instance { mesh: mesh.clone(), pose, scale, material, id }
     }
 }
 

@@ -16,7 +16,7 @@ use crate::{
     robot::{Robot, TICK_S},
     scenario::{CameraSpec, JudgeSpec, Scenario, SurfaceSpec, WorldSpec},
     snapshot::WorldState,
-    state,
+    state, texture,
     truth::{TrueObject, true_objects},
 };
 use acm_concept::{
@@ -26,7 +26,7 @@ use acm_concept::{
     pose::Pose,
     time::Time,
 };
-use acm_render::{Lighting, PointLight, Sun};
+use acm_render::{Lighting, Pattern, PointLight, Sun};
 use rapier3d::prelude::{ColliderBuilder, ColliderHandle, PhysicsWorld, RigidBodyBuilder, Vector};
 use rustix::time::ClockId;
 use std::sync::Arc;
@@ -55,6 +55,8 @@ pub(crate) struct World {
     pub(crate) lighting: Lighting,
     /// Factors by which the cameras' colours are too bright.
     pub(crate) exposures: Vec<f64>,
+    /// What is painted on each surface.
+    pub(crate) textures: Vec<Option<Pattern>>,
     /// Names of the judge's variables, and their values.
     pub(crate) variables: Vec<String>,
     pub(crate) state: Vec<f64>,
@@ -100,6 +102,9 @@ impl World {
             source: source.into(),
         };
         let events = event::build(spec, layout, &variables).map_err(layout_error)?;
+        for event in &events {
+            event.prepare(&mut physics, &mut bodies);
+        }
         Ok(World {
             bystanders: bystanders(spec, &scenario.judge, &bodies),
             judge: Judge::new(&scenario.judge, &variables),
@@ -110,6 +115,7 @@ impl World {
             fluents: Fluents::build(spec, layout, &variables).map_err(layout_error)?,
             lighting: lighting(spec, layout).map_err(layout_error)?,
             exposures: exposures(spec, layout).map_err(layout_error)?,
+            textures: textures(spec, layout).map_err(layout_error)?,
             contacts: Contacts::default(),
             timings: SimTimings::default(),
             motion: options.motion,
@@ -345,6 +351,11 @@ fn lighting(spec: &WorldSpec, layout: &Layout) -> Result<Lighting, LayoutError> 
         sun: Sun { direction, intensity: number(&light.sun)? as f32, ..Lighting::default().sun },
         points: light.points.iter().map(point).collect::<Result<_, LayoutError>>()?,
     })
+}
+
+fn textures(spec: &WorldSpec, layout: &Layout) -> Result<Vec<Option<Pattern>>, LayoutError> {
+    let scope = layout.scope();
+    spec.surfaces.iter().map(|surface| texture::chosen(&surface.name, &surface.textures, &scope)).collect()
 }
 
 fn exposures(spec: &WorldSpec, layout: &Layout) -> Result<Vec<f64>, LayoutError> {

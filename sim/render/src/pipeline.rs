@@ -4,9 +4,11 @@ use bytemuck::{Pod, Zeroable};
 use std::collections::BTreeMap;
 use wgpu::{BindingType, ShaderStages, TextureFormat};
 
-/// Colour as 8-bit sRGB; depth as the bits of a float, because float targets cannot be drawn to on GL; ids.
-pub(crate) const TARGET_FORMATS: [TextureFormat; 3] =
-    [TextureFormat::Rgba8UnormSrgb, TextureFormat::R32Uint, TextureFormat::R32Uint];
+/// Colour as 8-bit sRGB; depth as the bits of a float, because float targets cannot be drawn to on GL, and the id beside
+/// it, because every further target costs a processor that draws time.
+pub(crate) const TARGET_FORMATS: [TextureFormat; 2] = [TextureFormat::Rgba8UnormSrgb, TextureFormat::Rg32Uint];
+/// Bytes of a pixel of each.
+pub(crate) const PIXEL_BYTES: [u32; 2] = [4, 8];
 pub(crate) const DEPTH_FORMAT: TextureFormat = TextureFormat::Depth32Float;
 
 /// A vertex as the shader reads it.

@@ -50,9 +50,8 @@ struct Surface {
 
 struct Pixel {
     @location(0) color: vec4<f32>,
-    // Bits of a float: float targets cannot be drawn to everywhere.
-    @location(1) depth: u32,
-    @location(2) id: u32,
+    // Depth as the bits of a float, for float targets cannot be drawn to everywhere; id.
+    @location(1) depth_and_id: vec2<u32>,
 };
 
 fn to_camera(v: Vertex) -> vec3<f32> {
@@ -152,8 +151,7 @@ fn shade(in: Surface, base: vec3<f32>) -> Pixel {
     var out: Pixel;
     // Too much light keeps its hue instead of bleaching to white.
     out.color = vec4<f32>(color / max(1.0, max(color.r, max(color.g, color.b))), 1.0);
-    out.depth = bitcast<u32>(in.position.z);
-    out.id = in.id;
+    out.depth_and_id = vec2<u32>(bitcast<u32>(in.position.z), in.id);
     return out;
 }
 

@@ -1,21 +1,18 @@
 //! What a frame is drawn into, and how it comes back. Kept per image size.
 
-use crate::pipeline::{DEPTH_FORMAT, TARGET_FORMATS};
+use crate::pipeline::{DEPTH_FORMAT, PIXEL_BYTES, TARGET_FORMATS};
 use crate::renderer::{RenderError, Rendered};
 use std::sync::mpsc;
 use wgpu::{BufferUsages, TextureUsages};
-
-/// Every pixel of every target has four bytes.
-const PIXEL_BYTES: u32 = 4;
 
 /// Targets and the readback buffer of one image size.
 pub(crate) struct Targets {
     width: u32,
     height: u32,
-    /// Bytes from one row to the next in the readback buffer: the device wants multiples of 256.
-    pitch: u32,
-    textures: [wgpu::Texture; 3],
-    views: [wgpu::TextureView; 3],
+    /// Bytes from one row of each target to its next in the readback buffer: the device wants multiples of 256.
+    pitches: [u32; 2],
+    textures: [wgpu::Texture; 2],
+    views: [wgpu::TextureView; 2],
     depth_test: wgpu::TextureView,
     readback: wgpu::Buffer,
 }
@@ -37,16 +34,16 @@ impl Targets {
         let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
         let textures =
             TARGET_FORMATS.map(|format| texture(format, TextureUsages::RENDER_ATTACHMENT | TextureUsages::COPY_SRC));
-        let pitch = (width * PIXEL_BYTES).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+        let pitches = PIXEL_BYTES.map(|bytes| (width * bytes).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT));
         let readback = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("readback"),
-            size: u64::from(pitch) * u64::from(height) * textures.len() as u64,
+            size: pitches.iter().map(|pitch| u64::from(*pitch) * u64::from(height)).sum(),
             usage: BufferUsages::COPY_DST | BufferUsages::MAP_READ,
             mapped_at_creation: false,
         });
-        let views = [view(&textures[0]), view(&textures[1]), view(&textures[2])];
+        let views = [view(&textures[0]), view(&textures[1])];
         let depth_test = view(&texture(DEPTH_FORMAT, TextureUsages::RENDER_ATTACHMENT));
-        Targets { width, height, pitch, textures, views, depth_test, readback }
+        Targets { width, height, pitches, textures, views, depth_test, readback }
     }
 
     pub(crate) fn is_of_size(&self, width: u32, height: u32) -> bool {
@@ -60,7 +57,7 @@ impl Targets {
         background: [f32; 3],
     ) -> wgpu::RenderPass<'e> {
         let [r, g, b] = background.map(f64::from);
-        let clear = [wgpu::Color { r, g, b, a: 1.0 }, wgpu::Color::TRANSPARENT, wgpu::Color::TRANSPARENT];
+        let clear = [wgpu::Color { r, g, b, a: 1.0 }, wgpu::Color::TRANSPARENT];
         let attachment = |index: usize| {
             Some(wgpu::RenderPassColorAttachment {
                 view: &self.views[index],
@@ -71,7 +68,7 @@ impl Targets {
         };
         encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("main"),
-            color_attachments: &[attachment(0), attachment(1), attachment(2)],
+            color_attachments: &[attachment(0), attachment(1)],
             depth_stencil_attachment: Some(depth_attachment(&self.depth_test, wgpu::StoreOp::Discard)),
             ..wgpu::RenderPassDescriptor::default()
         })
@@ -79,12 +76,11 @@ impl Targets {
 
     /// Records the copies into the readback buffer.
     pub(crate) fn copy(&self, encoder: &mut wgpu::CommandEncoder) {
-        for (index, texture) in self.textures.iter().enumerate() {
-            let layout = wgpu::TexelCopyBufferLayout {
-                offset: self.plane_bytes() as u64 * index as u64,
-                bytes_per_row: Some(self.pitch),
-                rows_per_image: Some(self.height),
-            };
+        let mut offset = 0;
+        for (texture, pitch) in self.textures.iter().zip(self.pitches) {
+            let layout =
+                wgpu::TexelCopyBufferLayout { offset, bytes_per_row: Some(pitch), rows_per_image: Some(self.height) };
+            offset += u64::from(pitch) * u64::from(self.height);
             let target = wgpu::TexelCopyBufferInfo { buffer: &self.readback, layout };
             let size = wgpu::Extent3d { width: self.width, height: self.height, depth_or_array_layers: 1 };
             encoder.copy_texture_to_buffer(texture.as_image_copy(), target, size);
@@ -113,30 +109,22 @@ impl Targets {
         Ok(rendered)
     }
 
-    fn plane_bytes(&self) -> usize {
-        self.pitch as usize * self.height as usize
-    }
-
-    /// Drops the row padding and the alpha channel.
+    /// Drops the row padding and the alpha channel, and parts depth from ids.
     fn unpack(&self, bytes: &[u8]) -> Rendered {
-        let row_bytes = (self.width * PIXEL_BYTES) as usize;
-        let rows = |plane: usize| {
-            bytes.chunks_exact(self.pitch as usize).skip(plane * self.height as usize).take(self.height as usize)
-        };
-        let pixels = self.width as usize * self.height as usize;
-        let mut color = vec![0; 3 * pixels];
-        for (from, to) in rows(0).zip(color.chunks_exact_mut(3 * self.width as usize)) {
-            for (rgba, rgb) in from.chunks_exact(4).zip(to.chunks_exact_mut(3)) {
-                rgb.copy_from_slice(&rgba[..3]);
+        let (width, height) = (self.width as usize, self.height as usize);
+        let [color_pitch, depth_pitch] = self.pitches.map(|pitch| pitch as usize);
+        let (colors, depths) = bytes.split_at(color_pitch * height);
+        let mut color = vec![0; 3 * width * height];
+        for (from, to) in colors.chunks_exact(color_pitch).zip(color.chunks_exact_mut(3 * width)) {
+            for ([r, g, b, _], to) in from.as_chunks().0.iter().zip(to.as_chunks_mut().0) {
+                *to = [*r, *g, *b];
             }
         }
-        let mut depth = vec![0f32; pixels];
-        for (from, to) in rows(1).zip(depth.chunks_exact_mut(self.width as usize)) {
-            bytemuck::cast_slice_mut(to).copy_from_slice(&from[..row_bytes]);
-        }
-        let mut ids = vec![0u32; pixels];
-        for (from, to) in rows(2).zip(ids.chunks_exact_mut(self.width as usize)) {
-            bytemuck::cast_slice_mut(to).copy_from_slice(&from[..row_bytes]);
+        let (mut depth, mut ids) = (Vec::with_capacity(width * height), Vec::with_capacity(width * height));
+        for row in depths.chunks_exact(depth_pitch) {
+            let pixels: &[[u32; 2]] = bytemuck::cast_slice(&row[..8 * width]);
+            depth.extend(pixels.iter().map(|[bits, _]| f32::from_bits(*bits)));
+            ids.extend(pixels.iter().map(|[_, id]| *id));
         }
         Rendered { width: self.width, height: self.height, color, depth, ids }
     }

@@ -2,7 +2,7 @@
 use crate::{
     Scenario,
     convert::vector,
-    testbed::{joint, object, push, run, truth, world, world_with},
+    testbed::{joint, object, object_text, push, run, truth, world, world_with},
     world::World,
 };
 use glam::DVec3;
@@ -242,4 +242,27 @@ fn the_shipped_joints_move_through_their_ranges() {
         }
     }
     assert!(moved > 15, "{moved} joints");
+}
+
+#[test]
+fn a_jammed_joint_stays_where_it_is_until_it_is_let_go() {
+    let jam = "[[event]]\nname = 'it sticks'\nafter_s = 0.2\nover_s = 1.0\n\
+               jam = { object = 'thing', joint = 'JOINT' }\n";
+    let cabinet = object("drawer-cabinet");
+    let name = joint_names(&world(&cabinet)).remove(0);
+    let mut world = world(&format!("{cabinet}{}", jam.replace("JOINT", &name)));
+    run(&mut world, 0.3);
+    push(&mut world, &name, 40.0, 0.6);
+    assert!(joint(&world, &name).opened < 0.02, "{:?}", joint(&world, &name));
+    run(&mut world, 0.5);
+    push(&mut world, &name, 40.0, 0.6);
+    assert!(joint(&world, &name).opened > 0.2, "{:?}", joint(&world, &name));
+    assert_eq!(world.audit.report().violations, 0, "{:?}", world.audit.report());
+    let wrong = object_text(&format!("{cabinet}{}", jam.replace("JOINT", "dor")));
+    let error = Scenario::parse("t.toml", &wrong).unwrap_err().to_string();
+    assert!(error.contains("no joint `dor`"), "{error}");
+}
+
+fn joint_names(world: &World) -> Vec<String> {
+    truth(world).links.into_iter().filter(|link| link.joint.is_some()).map(|link| link.name).collect()
 }

@@ -229,7 +229,24 @@ impl<'a> Meaning<'a> {
             color: raw.color,
             friction: raw.friction,
             support: raw.support,
+            textures: self.textures(&format!("surface `{}`", raw.name), &raw.texture, &self.plain_names())?,
         })
+    }
+
+    fn textures(&self, field: &str, raw: &[RawTexture], names: &[&str]) -> Result<Vec<TextureSpec>, ScenarioError> {
+        let field = format!("{field}.texture");
+        let optional =
+            |number: &Option<Number>| number.as_ref().map(|number| self.number(&field, number, names)).transpose();
+        let texture = |raw: &RawTexture| {
+            Ok(TextureSpec {
+                kind: raw.kind,
+                color: raw.color,
+                hue_deg: optional(&raw.hue_deg)?,
+                cell_m: optional(&raw.cell_m)?,
+                when: raw.when.as_ref().map(|when| self.expression(&field, when, names)).transpose()?,
+            })
+        };
+        raw.iter().map(texture).collect()
     }
 
     fn camera(&self, raw: &RawCamera) -> Result<CameraSpec, ScenarioError> {
@@ -365,6 +382,7 @@ impl<'a> Meaning<'a> {
             on: on.transpose()?,
             scale: raw.scale.as_ref().map(|scale| self.triple(&field, scale, &names)).transpose()?,
             hue_deg: raw.hue_deg.as_ref().map(|hue| self.number(&field, hue, &names)).transpose()?,
+            textures: self.textures(&field, &raw.texture, &names)?,
             density_kg_m3: raw.density_kg_m3.as_ref().map(|kg| self.number(&field, kg, &names)).transpose()?,
             friction: raw.friction.as_ref().map(|mu| self.number(&field, mu, &names)).transpose()?,
             perturb: raw.perturb,
@@ -453,16 +471,39 @@ impl<'a> Meaning<'a> {
     }
 
     fn deed(&self, field: &str, raw: &RawEvent, names: &[&str]) -> Result<DeedSpec, ScenarioError> {
-        match (&raw.carry, &raw.to, raw.cover.as_slice(), raw.freeze.as_slice()) {
-            (Some(carry), Some(to), [], []) => Ok(DeedSpec::Carry {
+        match (&raw.carry, &raw.to, raw.cover.as_slice(), raw.freeze.as_slice(), &raw.jam) {
+            (Some(carry), Some(to), [], [], None) => Ok(DeedSpec::Carry {
                 object: self.reference(field, carry)?,
                 to: self.triple(field, to, names)?,
                 yaw: self.number(field, raw.yaw.as_ref().unwrap_or(&Number::Plain(0.0)), names)?,
                 lift_m: raw.lift_m,
             }),
-            (None, None, cover @ [_, ..], []) => Ok(DeedSpec::Cover { cameras: self.cameras(field, cover)? }),
-            (None, None, [], freeze @ [_, ..]) => Ok(DeedSpec::Freeze { cameras: self.cameras(field, freeze)? }),
-            _ => Err(self.wrong(field, "needs either `carry` and `to`, or `cover`, or `freeze`")),
+            (None, None, cover @ [_, ..], [], None) => Ok(DeedSpec::Cover { cameras: self.cameras(field, cover)? }),
+            (None, None, [], freeze @ [_, ..], None) => Ok(DeedSpec::Freeze { cameras: self.cameras(field, freeze)? }),
+            (None, None, [], [], Some(jam)) => self.jam(field, jam),
+            _ => Err(self.wrong(field, "needs either `carry` and `to`, or `cover`, or `freeze`, or `jam`")),
+        }
+    }
+
+    fn jam(&self, field: &str, raw: &RawJointReference) -> Result<DeedSpec, ScenarioError> {
+        let field = format!("{field}.jam");
+        let object = self.known_object(&field, &raw.object)?;
+        let at = self
+            .raw
+            .object
+            .iter()
+            .position(|known| known.name == object)
+            .filter(|at| self.raw.object[*at].count.is_none());
+        let at =
+            at.ok_or_else(|| self.wrong(&field, format!("`{object}` has copies; only one without can be named")))?;
+        let model = &self.models[at];
+        let known = || model.joints().map(|(link, _)| model.links[link].name.as_str());
+        match model.joints().find(|(link, _)| model.links[*link].name == raw.joint) {
+            Some((link, _)) => Ok(DeedSpec::Jam { object, link }),
+            None => {
+                let reason = format!("`{object}` has no joint `{}`{}", raw.joint, nearest(&raw.joint, known()));
+                Err(self.wrong(field, reason))
+            }
         }
     }
 

@@ -6,11 +6,11 @@ mod raw;
 mod setting;
 mod spec;
 
-pub(crate) use raw::{Color, RawPerturb};
+pub(crate) use raw::{Color, RawPerturb, TextureKind};
 pub use setting::Setting;
 pub(crate) use spec::{
     CameraSpec, DeedSpec, EventSpec, JudgeSpec, ObjectSpec, PlaceAt, PlaceSpec, PredicateSpec, Reference, RejectRule,
-    RejectSpec, SurfaceSpec, TaskTemplate, WorldSpec,
+    RejectSpec, SurfaceSpec, TaskTemplate, TextureSpec, WorldSpec,
 };
 #[cfg(test)]
 pub(crate) use spec::{StageSpec, ViolationSpec};

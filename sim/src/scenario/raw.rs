@@ -158,6 +158,40 @@ pub(crate) struct RawSurface {
     /// Whether objects may be set down on its top. Default: false.
     #[serde(default)]
     pub(crate) support: bool,
+    /// Patterns painted over its colour: the first whose `when` holds. Default: none.
+    #[serde(default)]
+    pub(crate) texture: Vec<RawTexture>,
+}
+
+/// A pattern of a second colour, as on a tiled table or on printed card.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct RawTexture {
+    /// Its form.
+    pub(crate) kind: TextureKind,
+    /// The second colour.
+    pub(crate) color: Color,
+    /// Hue of the second colour, degrees, its saturation and brightness kept. Default: its own.
+    #[serde(default)]
+    pub(crate) hue_deg: Option<Number>,
+    /// Edge of a cell, metres, 0.001 to 1. Default: 0.03.
+    #[serde(default)]
+    pub(crate) cell_m: Option<Number>,
+    /// Condition over draws. Default: it always holds.
+    #[serde(default)]
+    pub(crate) when: Option<String>,
+}
+
+/// The form of a pattern.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum TextureKind {
+    /// Squares, every other one painted.
+    Checker,
+    /// Bands, every other one painted.
+    Stripes,
+    /// Squares, one in six painted, irregularly.
+    Speckle,
 }
 
 /// Lights.
@@ -391,6 +425,9 @@ pub(crate) struct RawObject {
     /// model's own.
     #[serde(default)]
     pub(crate) hue_deg: Option<Number>,
+    /// Patterns painted over its colours: the first whose `when` holds. Default: none.
+    #[serde(default)]
+    pub(crate) texture: Vec<RawTexture>,
     /// Density of its solids instead of the model's, kg/m3, 1 to 25000.
     #[serde(default)]
     pub(crate) density_kg_m3: Option<Number>,
@@ -411,6 +448,16 @@ pub(crate) struct RawReference {
     /// Which copy, from 0. Default: 0.
     #[serde(default)]
     pub(crate) index: Option<Number>,
+}
+
+/// A joint of an object that has no copies.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct RawJointReference {
+    /// Name of the object.
+    pub(crate) object: String,
+    /// Name of the joint.
+    pub(crate) joint: String,
 }
 
 /// How far real copies differ from their model.
@@ -445,7 +492,8 @@ pub(crate) struct RawPlace {
     pub(crate) position: Option<[Number; 3]>,
 }
 
-/// A third party carries an object from where it is to another place, or covers or freezes cameras for a while.
+/// A third party carries an object from where it is to another place, or covers or freezes cameras, or jams a joint for a
+/// while.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct RawEvent {
@@ -467,6 +515,9 @@ pub(crate) struct RawEvent {
     /// Names of the cameras that stop instead: for as long as it takes they go on delivering their last picture.
     #[serde(default)]
     pub(crate) freeze: Vec<String>,
+    /// A joint that sticks instead: for as long as it takes it stays where it is, whoever pulls.
+    #[serde(default)]
+    pub(crate) jam: Option<RawJointReference>,
     /// Where the base frame of what is carried comes to stand, metres. Expressions can use places and plain draws.
     #[serde(default)]
     pub(crate) to: Option<[Number; 3]>,

@@ -1,6 +1,6 @@
 //! The meaning of a scenario file: what the simulator builds, what the judge decides, what the agent is told.
 
-use super::raw::{Color, RawPerturb};
+use super::raw::{Color, RawPerturb, TextureKind};
 use crate::{
     mishap::MishapKind,
     model::ObjectModel,
@@ -78,6 +78,16 @@ pub(crate) struct SurfaceSpec {
     pub(crate) color: Color,
     pub(crate) friction: f64,
     pub(crate) support: bool,
+    pub(crate) textures: Vec<TextureSpec>,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct TextureSpec {
+    pub(crate) kind: TextureKind,
+    pub(crate) color: Color,
+    pub(crate) hue_deg: Option<Expression>,
+    pub(crate) cell_m: Option<Expression>,
+    pub(crate) when: Option<Expression>,
 }
 
 #[derive(Debug, Clone)]
@@ -117,6 +127,7 @@ pub(crate) struct ObjectSpec {
     pub(crate) on: Option<Reference>,
     pub(crate) scale: Option<[Expression; 3]>,
     pub(crate) hue_deg: Option<Expression>,
+    pub(crate) textures: Vec<TextureSpec>,
     pub(crate) density_kg_m3: Option<Expression>,
     pub(crate) friction: Option<Expression>,
     pub(crate) perturb: Option<RawPerturb>,
@@ -163,6 +174,11 @@ pub(crate) enum DeedSpec {
     /// Indices of the cameras.
     Cover {
         cameras: Vec<usize>,
+    },
+    /// Index of the link whose joint it is.
+    Jam {
+        object: String,
+        link: usize,
     },
     /// Indices of the cameras.
     Freeze {
