@@ -1,12 +1,12 @@
 //! Move: carry what is held, watching that it stays in the hand; and lower it until it stands.
 
-use super::{Grip, GripWatch, Outcome, Primitive, Rest, Step, check_collision};
+use super::{Failure, Grip, GripWatch, Outcome, Primitive, Rest, Step, check_collision};
 use crate::{
     advance::{Advance, Progress},
-    hand::Hand,
+    hand::{Hand, pads_in_contact},
     motion::Path,
 };
-use acm_concept::{embodiment::Feedback, primitive::Primitive as Kind};
+use acm_concept::{embodiment::Feedback, primitive::Primitive as Kind, skill::FailureCause};
 use glam::DVec3;
 
 /// What is allowed beyond the path's own time, seconds: rest, and pauses where the grip is unsure.
@@ -15,6 +15,8 @@ const SLACK_S: f64 = 4.0;
 const LOWERING_M_S: f64 = 0.03;
 /// Upward force that tells that what is held stands on something, newtons.
 const STANDING_N: f64 = 3.5;
+/// How long the hand stands still on a touch before it is believed, seconds: what is knocked out of the hand is felt too.
+const BELIEVED_S: f64 = 0.04;
 
 /// Flies a path with something in the hand, then comes to rest and takes its weight as the wrist's zero.
 #[derive(Debug)]
@@ -63,6 +65,8 @@ impl Primitive for Carry {
 pub(crate) struct Lower {
     advance: Advance,
     watch: GripWatch,
+    /// The force of the touch and for how many ticks it is known.
+    touched: Option<(f64, u32)>,
     limit_s: f64,
 }
 
@@ -71,7 +75,7 @@ impl Lower {
     pub fn new(hand: &Hand, floor_m: f64, watch: GripWatch) -> Lower {
         let travel_m = hand.command.tcp.translation.z - floor_m;
         let advance = Advance::new(hand, -DVec3::Z, travel_m, LOWERING_M_S, STANDING_N);
-        Lower { limit_s: advance.duration_s() + SLACK_S, advance, watch }
+        Lower { limit_s: advance.duration_s() + SLACK_S, advance, watch, touched: None }
     }
 }
 
@@ -90,15 +94,25 @@ impl Primitive for Lower {
             Ok(Grip::Firm | Grip::Shifted) => {}
         }
         let height_m = feedback.tcp.translation.z;
-        match self.advance.tick(hand) {
-            Progress::Onward => Step::Act,
-            Progress::Touched => {
-                // The spring of the wrist is let go, so that opening the fingers does not shoot the object away.
-                let touch_n = Some(hand.felt_n().z);
-                hand.command_height(height_m);
-                Step::Done(Outcome::Lowered { touch_n, height_m })
+        if self.touched.is_none() {
+            match self.advance.tick(hand) {
+                Progress::Onward => {}
+                Progress::Touched => self.touched = Some((hand.felt_n().z, 0)),
+                Progress::End => return Step::Done(Outcome::Lowered { touch_n: None, height_m }),
             }
-            Progress::End => Step::Done(Outcome::Lowered { touch_n: None, height_m }),
         }
+        let Some((touch_n, ticks)) = &mut self.touched else { return Step::Act };
+        if *ticks < hand.ticks(BELIEVED_S) {
+            *ticks += 1;
+            return Step::Act;
+        }
+        if hand.robot.suction.is_none() && pads_in_contact(feedback) == [false, false] {
+            let reason = format!("it was lost as it was set down: felt {touch_n:.0} N, and then neither pad felt anything");
+            return Step::Failed(Failure::empty_handed(FailureCause::Grasp, reason));
+        }
+        // The spring of the wrist is let go, so that opening the fingers does not shoot the object away.
+        let touch_n = Some(*touch_n);
+        hand.command_height(height_m);
+        Step::Done(Outcome::Lowered { touch_n, height_m })
     }
 }

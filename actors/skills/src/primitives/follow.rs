@@ -53,7 +53,8 @@ const RUN_UP_S: f64 = 0.25;
 /// Speed of a turn in place, rad/s; and the share of the robot's turning speed that an arc may take.
 const IN_PLACE_RAD_S: f64 = 0.9;
 const TURN_SHARE: f64 = 0.6;
-/// The end of the way in which a pushed thing must still have been felt, as a share of it.
+/// The end of the way in which a pushed thing must still have been felt, metres, and no more of it than this share.
+const LAST_M: f64 = 0.02;
 const LAST_SHARE: f64 = 0.25;
 
 /// How the hand holds on to the part.
@@ -258,7 +259,8 @@ impl Follow {
 
     /// The whole way is behind, as far as the command goes.
     fn arrive(&mut self, hand: &Hand, at: DVec3) -> Step {
-        if matches!(self.plan.hold, Hold::Contact) && !self.touch.felt_since((1.0 - LAST_SHARE) * self.goal) {
+        let last = (LAST_M / self.lever).min(LAST_SHARE * self.goal);
+        if matches!(self.plan.hold, Hold::Contact) && !self.touch.felt_since(self.goal - last) {
             let reason = match self.touch.felt_at {
                 None => "the hand went the whole way and felt nothing that it could push".into(),
                 Some(last) => format!("what was pushed was lost on the way: last felt at {}", self.words(last)),
