@@ -93,7 +93,7 @@ fn audited(result: &mut BenchResult, violations: u64) {
 }
 
 /// A bar on standard error that says how far a part has come.
-fn progress(what: &'static str, length: u64) -> ProgressBar {
+fn progress(what: &str, length: u64) -> ProgressBar {
     let bar = ProgressBar::new(length);
     let style = ProgressStyle::with_template(&format!("{what} {{bar:30}} {{pos}}/{{len}} {{elapsed}} eta {{eta}}"));
     match style {

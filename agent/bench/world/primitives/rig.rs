@@ -36,6 +36,11 @@ pub fn scenario(models: &str, objects: &str, friction: f64) -> String {
     scenario_on(models, objects, friction, TABLE_M, DVec3::new(0.0, 0.0, 1.3), [low, DVec3::new(1.4, 1.4, 2.2)])
 }
 
+/// As [`scenario`], with another robot, where and as it stands in its file.
+pub fn scenario_with(robot: &str, models: &str, objects: &str, friction: f64) -> String {
+    text(models, objects, friction, TABLE_M, &format!("model = \"{robot}\""))
+}
+
 /// As [`scenario`], on a ground of another height, with the hand's home and the corners of its workspace.
 pub fn scenario_on(
     models: &str,
@@ -45,6 +50,10 @@ pub fn scenario_on(
     home: DVec3,
     [low, high]: [DVec3; 2],
 ) -> String {
+    text(models, objects, friction, ground_m, &format!("home = {home}\nworkspace = [{low}, {high}]"))
+}
+
+fn text(models: &str, objects: &str, friction: f64, ground_m: f64, robot: &str) -> String {
     format!(
         r##"scenario = "rig"
 summary = "a world for one try of a skill"
@@ -68,8 +77,7 @@ forward = [0.0, 0.6, -0.8]
 left = [-1.0, 0.0, 0.0]
 fov_y_deg = 50.0
 [robot]
-home = {home}
-workspace = [{low}, {high}]
+{robot}
 [[judge.strict.stage]]
 name = "never"
 when = "time > 1000000"

@@ -44,6 +44,9 @@ pub struct Cell {
     /// What goes wrong, if anything.
     #[serde(default)]
     pub fault: Option<Fault>,
+    /// The robot that does it; the floating gripper with a roomy workspace if none is named.
+    #[serde(default)]
+    pub robot: Option<String>,
     /// Its values.
     #[serde(flatten)]
     spans: BTreeMap<String, Span>,
@@ -56,6 +59,9 @@ pub struct Table {
     /// Values of every cell that does not give its own.
     #[serde(default)]
     spans: BTreeMap<String, Span>,
+    /// Robots that try every cell without a fault once, where they stand.
+    #[serde(default)]
+    robots: Vec<String>,
     /// The cells.
     pub cell: Vec<Cell>,
 }
@@ -88,6 +94,12 @@ impl Table {
             ensure!(sound, "{file}: `{name}` must be a number or a span [low, high]");
         }
         Ok(table)
+    }
+    /// For every robot of the table, its name and the cells that it tries.
+    pub fn by_robot(&self) -> impl Iterator<Item = (&str, Vec<Cell>)> {
+        let sound = || self.cell.iter().filter(|cell| cell.fault.is_none());
+        let given = move |robot: &String| sound().map(|cell| Cell { robot: Some(robot.clone()), ..cell.clone() }).collect();
+        self.robots.iter().map(move |robot| (robot.as_str(), given(robot)))
     }
     /// The values of a cell for a seed. Cells draw apart from each other.
     pub fn draw(&self, cell: &Cell, seed: u64) -> Values {

@@ -1,7 +1,7 @@
 //! One try of a cell: the world of a seed, the skill, and what truly came of it.
 
 use super::{
-    rig::{Rig, TABLE_M, invocation, part, place, scenario},
+    rig::{Rig, TABLE_M, invocation, part, place, scenario, scenario_with},
     table::{Cell, Fault, Values},
 };
 use acm_concept::{
@@ -178,7 +178,12 @@ impl<'a> Stage<'a> {
                 "[[event]]\nname = \"slip\"\nafter_s = {at_s}\nover_s = 0.02\ncarry = {{ object = \"thing\" }}\nto = [0.9, 0.9, {TABLE_M}]\n"
             );
         }
-        let rig = Rig::new(&scenario(&models, &objects, values.get("friction")), seed)?;
+        let friction = values.get("friction");
+        let text = match &cell.robot {
+            None => scenario(&models, &objects, friction),
+            Some(robot) => scenario_with(robot, &models, &objects, friction),
+        };
+        let rig = Rig::new(&text, seed)?;
         Ok(Stage { cell, values, thing, rig, base, goal, window: (0.0, 0.0) })
     }
 
