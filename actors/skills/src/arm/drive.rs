@@ -21,6 +21,8 @@ const MARGIN_M: f64 = 0.02;
 const SLACK_M: f64 = 0.002;
 /// A configuration from which the hand can go on along its approach by this much is preferred, metres.
 const APPROACH_M: f64 = 0.09;
+/// There its links must stay this far from the floor, metres: a tick's way and a wrist's height are not known better.
+const FLOOR_M: f64 = 0.01;
 /// Steps in which that is tried, metres.
 const APPROACH_STEP_M: f64 = 0.01;
 /// Configurations for the end of a way that are compared, and starts from which they are looked for.
@@ -239,7 +241,8 @@ impl Drive {
                 break;
             }
             let (next, there) = track(arm, &Pose { translation, ..*goal }, &joints);
-            if !there || next.farthest(&joints) > 0.25 || !self.scene.is_untangled(&next) {
+            let touches = !self.scene.is_untangled(&next) || self.scene.above_floor(&next) < FLOOR_M;
+            if !there || next.farthest(&joints) > 0.25 || touches {
                 return false;
             }
             joints = next;

@@ -87,6 +87,17 @@ impl Scene {
         inside && self.is_untangled(joints) && self.clearance(joints) >= margin_m
     }
 
+    /// Smallest distance from the arm's links to the floor: metres, negative below it, at most [`FAR_M`].
+    pub fn above_floor(&self, joints: &Joints) -> f64 {
+        let frames = self.arm.frames(joints);
+        let (there, floor) = &self.floor;
+        let distance = |nearest, (link, capsule): &(usize, Capsule)| {
+            let at = to_engine(&frames.get(*link).copied().unwrap_or_default());
+            nearer(&at, capsule, there, floor, nearest)
+        };
+        f64::from(self.links.iter().fold(FAR_M as f32, distance))
+    }
+
     /// Smallest distance from the arm, the hand and what it holds to anything perceived: metres, negative inside, at
     /// most [`FAR_M`].
     pub fn clearance(&self, joints: &Joints) -> f64 {

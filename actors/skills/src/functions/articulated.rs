@@ -123,10 +123,18 @@ fn note_travel(moment: &mut Moment<'_>, object: ObjectId, felt: Felt) -> Option<
 
 /// What is around the part: perceived solids without the part's own object, and the support.
 pub(crate) fn surroundings(invocation: &SkillInvocation) -> Surroundings {
-    let own = invocation.part.object;
+    solids_but(invocation, Some(invocation.part.object))
+}
+
+/// As [`surroundings`], with the part's own object: a hand on its way to the part must not touch that either.
+pub(crate) fn all_around(invocation: &SkillInvocation) -> Surroundings {
+    solids_but(invocation, None)
+}
+
+fn solids_but(invocation: &SkillInvocation, own: Option<ObjectId>) -> Surroundings {
     let held = invocation.held.as_ref().map(|(object, _, _)| *object);
-    let other = |id: &ObjectId| *id != own && Some(*id) != held;
-    let obstacles = invocation.obstacles.iter().filter(|(id, _)| other(id)).map(|(_, solid)| *solid).collect();
+    let counts = |id: &ObjectId| Some(*id) != own && Some(*id) != held;
+    let obstacles = invocation.obstacles.iter().filter(|(id, _)| counts(id)).map(|(_, solid)| *solid).collect();
     Surroundings { obstacles, floor_m: invocation.support_height_m }
 }
 

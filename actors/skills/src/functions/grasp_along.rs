@@ -4,7 +4,11 @@
 //! along y, and `height`, of the thing over its base, metres; `sides`, how many sides look alike when it is turned about
 //! the upright axis through its base (1 if absent; 0 for round things): their approaches are tried as well.
 
-use super::{PERCEPTION_ERROR_M, ROOMY_M, argument, articulated::surroundings, number, require_empty_hand};
+use super::{
+    PERCEPTION_ERROR_M, ROOMY_M, argument,
+    articulated::{all_around, surroundings},
+    number, require_empty_hand,
+};
 use crate::{
     approach::{Surroundings, TILTS, choose, drawn_back, facing, tilted, turned_about, way},
     clearance::SAFETY_M,
@@ -42,6 +46,7 @@ pub(crate) struct GraspAlong {
     object: ObjectId,
     base: Pose,
     at: Pose,
+    /// What the hand keeps clear of on its way.
     around: Surroundings,
     opening_m: f64,
     plan: GraspPlan,
@@ -60,21 +65,20 @@ impl GraspAlong {
             return Err(StartError::TooWide { width_m, opening_m: largest_m });
         }
         let opening_m = (width_m + SPREAD_M).min(largest_m);
-        let around = surroundings(invocation);
         let at = choose(
             hand,
             "grasp it",
             candidates(invocation, hand),
             opening_m,
             STANDOFF_M,
-            &around,
+            &surroundings(invocation),
             [ROOMY_M, PERCEPTION_ERROR_M],
         )?;
         Ok(GraspAlong {
             object: invocation.part.object,
             base: invocation.target.pose.pose,
             at,
-            around,
+            around: all_around(invocation),
             opening_m,
             plan: GraspPlan {
                 travel_m: STANDOFF_M,

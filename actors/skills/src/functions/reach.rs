@@ -3,7 +3,11 @@
 //! The hand comes to look against the frame's z axis. Arguments: `distance`, how far the finger tips stay from the frame,
 //! metres; `opening`, how wide the fingers then are, metres (as they are if absent).
 
-use super::{PERCEPTION_ERROR_M, ROOMY_M, argument, articulated::surroundings, number};
+use super::{
+    PERCEPTION_ERROR_M, ROOMY_M, argument,
+    articulated::{all_around, surroundings},
+    number,
+};
 use crate::{
     approach::{Surroundings, TILTS, choose, facing, tilted, turned_about, way},
     controller::StartError,
@@ -28,7 +32,6 @@ impl Reach {
     pub fn plan(invocation: &SkillInvocation, hand: &Hand) -> Result<Reach, StartError> {
         let distance_m = argument(invocation, "distance")?;
         let opening_m = number(invocation, "opening", hand.command.opening_m).clamp(0.0, hand.robot.max_opening_m);
-        let around = surroundings(invocation);
         let facing = facing(&invocation.frame);
         let first = if hand.command.tcp.angle_to(&turned_about(&facing)) < hand.command.tcp.angle_to(&facing) {
             turned_about(&facing)
@@ -37,8 +40,16 @@ impl Reach {
         };
         let before = Pose::from_translation(-(distance_m + hand.tip_reach_m) * DVec3::Z);
         let candidates = TILTS.map(|angle| tilted(&first, angle) * before);
-        let to = choose(hand, "reach it", candidates, opening_m, 0.0, &around, [ROOMY_M, PERCEPTION_ERROR_M])?;
-        Ok(Reach { object: invocation.part.object, to, opening_m, around })
+        let to = choose(
+            hand,
+            "reach it",
+            candidates,
+            opening_m,
+            0.0,
+            &surroundings(invocation),
+            [ROOMY_M, PERCEPTION_ERROR_M],
+        )?;
+        Ok(Reach { object: invocation.part.object, to, opening_m, around: all_around(invocation) })
     }
 }
 

@@ -107,7 +107,8 @@ impl Primitive for Lower {
             return Step::Act;
         }
         if hand.robot.suction.is_none() && pads_in_contact(feedback) == [false, false] {
-            let reason = format!("it was lost as it was set down: felt {touch_n:.0} N, and then neither pad felt anything");
+            let reason =
+                format!("it was lost as it was set down: felt {touch_n:.0} N, and then neither pad felt anything");
             return Step::Failed(Failure::empty_handed(FailureCause::Grasp, reason));
         }
         // The spring of the wrist is let go, so that opening the fingers does not shoot the object away.

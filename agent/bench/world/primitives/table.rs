@@ -98,7 +98,8 @@ impl Table {
     /// For every robot of the table, its name and the cells that it tries.
     pub fn by_robot(&self) -> impl Iterator<Item = (&str, Vec<Cell>)> {
         let sound = || self.cell.iter().filter(|cell| cell.fault.is_none());
-        let given = move |robot: &String| sound().map(|cell| Cell { robot: Some(robot.clone()), ..cell.clone() }).collect();
+        let given =
+            move |robot: &String| sound().map(|cell| Cell { robot: Some(robot.clone()), ..cell.clone() }).collect();
         self.robots.iter().map(move |robot| (robot.as_str(), given(robot)))
     }
     /// The values of a cell for a seed. Cells draw apart from each other.

@@ -9,6 +9,7 @@ use acm_concept::{
     pose::Pose,
     primitive::Primitive,
     skill::{SkillInvocation, SkillReport},
+    solid::{PlacedSolid, Solid},
 };
 use anyhow::Result;
 use glam::{DQuat, DVec2, DVec3};
@@ -81,6 +82,15 @@ impl Thing {
             values.get("friction"),
             0.5 * height
         )
+    }
+    /// Where it is when its base is there.
+    fn solid(&self, base: Pose) -> PlacedSolid {
+        let Thing { width, depth, height, round } = *self;
+        let solid = match round {
+            true => Solid::Cylinder { radius: 0.5 * width, height },
+            false => Solid::Box { size: DVec3::new(depth, width, height) },
+        };
+        PlacedSolid { solid, pose: base * Pose::from_translation(0.5 * height * DVec3::Z) }
     }
     fn arguments(&self) -> Vec<(&'static str, f64)> {
         vec![("grip_width", self.width), ("cross_width", self.depth), ("height", self.height)]
@@ -233,7 +243,7 @@ impl<'a> Stage<'a> {
             }
             Primitive::Move | Primitive::Rotate | Primitive::Insert | Primitive::Release => {
                 let report =
-                    self.rig.done(&pick).map_err(|reason| format!("before the {}: {reason}", self.cell.primitive))?;
+                    self.run(pick).map_err(|reason| format!("before the {}: {reason}", self.cell.primitive))?;
                 let Some((_, held)) = report.held else {
                     return Err("the grasp did not say how the thing sits in the hand".into());
                 };
@@ -267,9 +277,17 @@ impl<'a> Stage<'a> {
         }
     }
 
+    /// Runs a skill that is told the thing's solid where it was believed to stand, unless it is in the hand.
+    fn run(&mut self, mut invocation: SkillInvocation) -> Result<SkillReport, String> {
+        if invocation.held.is_none() {
+            invocation.obstacles.push((THING, self.thing.solid(self.base)));
+        }
+        self.rig.done(&invocation)
+    }
+
     fn test(&mut self, invocation: SkillInvocation) -> Result<SkillReport, String> {
         let began_s = self.rig.feedback().time.seconds();
-        let report = self.rig.done(&invocation);
+        let report = self.run(invocation);
         self.window = (began_s, self.rig.feedback().time.seconds());
         let whole = matches!(self.cell.primitive, Primitive::Grasp | Primitive::Release);
         if let Ok(report) = &report

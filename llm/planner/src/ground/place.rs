@@ -67,7 +67,13 @@ impl Grounder<'_> {
     }
 
     /// Where a thing stood when its exchange with another began: the second half of it looks one subtask farther back.
-    fn exchanged(&self, with: ReferenceIndex, first: bool, moved: ObjectId, subtask: u32) -> Result<Meant<Place>, Stuck> {
+    fn exchanged(
+        &self,
+        with: ReferenceIndex,
+        first: bool,
+        moved: ObjectId,
+        subtask: u32,
+    ) -> Result<Meant<Place>, Stuck> {
         let (other, phrase) = (self.object(with)?, self.phrase(with));
         if other.value == moved {
             let text = format!("{phrase} is {moved} itself: nothing changes places with itself");
