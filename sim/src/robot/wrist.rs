@@ -1,7 +1,9 @@
 //! The wrist: pulls the hand after a commanded pose with limited force.
 //!
 //! A kinematic body takes the commanded pose; motors of limited force on all six axes pull the real, dynamic hand
-//! after it. So the hand can be stopped by what it touches, and what it presses with is bounded.
+//! after it. So the hand can be stopped by what it touches, and what it presses with is bounded. What is held up is not
+//! left behind: the body waits for it, and catches up no faster than the robot moves. Otherwise a hand that comes free
+//! would be flung across the way that it was commanded meanwhile.
 
 use crate::{
     convert::{from_engine, to_engine},
@@ -16,6 +18,9 @@ const HAND_KG: f32 = 0.7;
 const SHIFT: [f32; 3] = [8000.0, 300.0, 60.0];
 /// The same for turns, N m/rad, N m s/rad, N m.
 const TURN: [f32; 3] = [200.0, 8.0, 10.0];
+/// How far the hand is held up before what pulls it waits: twice the deflection at which the motors give their all, metres
+/// and radians.
+const LEAD: [f64; 2] = [0.015, 0.1];
 
 /// Collision groups of the robot's parts. Everything else is in all groups.
 pub(crate) const FINGERS: Group = Group::GROUP_2;
@@ -50,11 +55,16 @@ impl Wrist {
         Wrist { follow, hand }
     }
 
-    /// Sets the pose that the hand is pulled to at the end of the next physics step.
-    pub(crate) fn drive(&self, world: &mut PhysicsWorld, target: &Pose) {
-        if let Some(body) = world.bodies.get_mut(self.follow) {
-            body.set_next_kinematic_position(to_engine(target));
-        }
+    /// Sets the pose that the hand is pulled to at the end of the next physics step: the commanded one, if the hand is near
+    /// it.
+    pub(crate) fn drive(&self, world: &mut PhysicsWorld, target: &Pose, robot: &RobotDescription) {
+        let step_s = f64::from(world.integration_parameters.dt);
+        let hand = self.tcp(world);
+        let Some(body) = world.bodies.get_mut(self.follow) else { return };
+        let at = from_engine(body.position());
+        let due = towards(&at, target, [robot.max_speed_m_s * step_s, robot.max_turn_rad_s * step_s]);
+        let next = towards(&hand, &due, LEAD);
+        body.set_next_kinematic_position(to_engine(&next));
     }
 
     /// Measured pose of the tool centre point.
@@ -72,6 +82,14 @@ impl Wrist {
         let [stiffness, damping, limit] = SHIFT.map(f64::from);
         (shift * stiffness + speed * damping).clamp(DVec3::splat(-limit), DVec3::splat(limit))
     }
+}
+
+/// A pose no farther from `from` than some metres and radians, as near to `to` as that allows.
+fn towards(from: &Pose, to: &Pose, [way_m, turn_rad]: [f64; 2]) -> Pose {
+    let share = |limit: f64, whole: f64| if whole > limit { limit / whole } else { 1.0 };
+    let way = share(way_m, from.translation.distance(to.translation));
+    let turn = share(turn_rad, from.angle_to(to));
+    Pose::new(from.translation.lerp(to.translation, way), from.rotation.slerp(to.rotation, turn))
 }
 
 /// A body whose own weight the arm carries.
