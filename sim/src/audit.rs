@@ -19,9 +19,11 @@ const MAX_TOLD: usize = 8;
 const PARTED_M: f64 = 0.0015;
 /// The same as a turn, radians.
 const PARTED_RAD: f64 = 0.05;
-/// A light part in its joint, leant on with the whole wrist, is pushed askew and straightened again: so much more is
-/// possible while something that moves touches it.
-const LEANT_ON: f64 = 5.0;
+/// What the robot leans on with its whole wrist, or what that is pushed against, is pushed into its neighbours or askew in its joint, and comes out again:
+/// so many times more is possible of shifts and of turns.
+const LEANT_ON: [f64; 2] = [3.0, 5.0];
+/// What is left after a step of having been leant on.
+const LEANT_ON_LATER: f64 = 0.9;
 /// Shifts without a velocity may add up to this, metres, and are forgotten at the rate below.
 const DRIFT_M: f64 = 0.01;
 /// Energy that may appear without a cause, J/kg: a height of 2 mm, or 0.2 m/s.
@@ -30,9 +32,9 @@ const GAIN_J_KG: f64 = 0.02;
 const REMEMBERED: f64 = 0.98;
 /// Slower things than this push nothing, m/s.
 const MOVING_M_S: f64 = 0.002;
-/// A hand that comes free springs back by its wrist's deflection; its motors' greatest force over the root of stiffness
-/// times mass, m/s.
-const RELEASE_M_S: f64 = 0.6;
+/// A hand that comes free springs back by its wrist's deflection: its motors' greatest force along all three axes over the
+/// root of stiffness times mass, m/s.
+const RELEASE_M_S: f64 = 0.95;
 /// Fingers that meet an object at their full speed press for an instant by a quarter more than they may.
 const IMPACT: f64 = 1.25;
 
@@ -51,6 +53,8 @@ pub(crate) struct Hand {
     pub(crate) at: DVec3,
     /// Mean forces on its pads in the control tick so far, hand frame, newtons.
     pub(crate) pads_n: [DVec3; 2],
+    /// Mean force on its wrist, newtons.
+    pub(crate) wrist_n: f64,
     pub(crate) max_speed_m_s: f64,
     pub(crate) max_grip_n: f64,
 }
@@ -77,6 +81,8 @@ struct Seen {
     energy: f64,
     drift: DVec3,
     gained: f64,
+    /// 1 while the robot touches it, less and less afterwards.
+    leant_on: f64,
 }
 
 impl Audit {
@@ -90,6 +96,7 @@ impl Audit {
         let step_s = f64::from(physics.integration_parameters.dt);
         self.watch_hands(hands, step_s, now_s);
         let before = std::mem::take(&mut self.seen);
+        let touched_by_robot = touched_by(physics, robot);
         for (handle, body) in physics.bodies.iter() {
             if body.is_fixed() || robot.contains(&handle) {
                 continue;
@@ -99,6 +106,10 @@ impl Audit {
             let place = self.seen.len();
             let known = before.get(place).filter(|known| known.handle == handle);
             let known = known.or_else(|| before.iter().find(|known| known.handle == handle));
+            seen.leant_on = match known {
+                _ if touched_by_robot.contains(&handle) => 1.0,
+                known => known.map_or(0.0, |known| known.leant_on * LEANT_ON_LATER),
+            };
             if let Some(known) = known.filter(|known| known.kind == seen.kind && body.is_dynamic()) {
                 let touched = || is_touched(physics, handle, robot, &before);
                 let found = seen.compare(known, step_s, touched).or_else(|| {
@@ -126,9 +137,10 @@ impl Audit {
     /// Looks at the grips after a control tick.
     pub(crate) fn grip(&mut self, hands: &[Hand], now_s: f64) {
         for hand in hands {
-            // What both pads feel in opposite directions is the grip; the rest is pushed against.
+            // What both pads feel in opposite directions is the grip; the rest is pushed against. A hand that is pushed
+            // down over a wedge feels about as much more.
             let grip = hand.pads_n[0].y.max(0.0).min((-hand.pads_n[1].y).max(0.0));
-            if grip > hand.max_grip_n * IMPACT {
+            if grip > hand.max_grip_n * IMPACT + hand.wrist_n {
                 self.tell(now_s, &format!("a hand gripped with {grip:.1} N, it can {} N", hand.max_grip_n));
             }
         }
@@ -172,11 +184,17 @@ impl Seen {
             energy: f64::from(body.kinetic_energy()) / mass + height,
             drift: DVec3::ZERO,
             gained: 0.0,
+            leant_on: 0.0,
         }
     }
 
     /// Is it where its velocity has taken it?
     fn compare(&mut self, before: &Seen, step_s: f64, touched: impl Fn() -> bool) -> Option<String> {
+        // What is touched by what moves is asked last, because it takes longest.
+        let beyond = |much: f64, parted: f64, leant_on: f64| {
+            let most = |leaning: f64| parted * (1.0 + (leant_on - 1.0) * leaning);
+            much > most(self.leant_on) && (much > most(1.0) || !touched())
+        };
         let shift = self.centre - before.centre;
         let off = shift - self.velocity * step_s;
         // Within a step the velocity changes from the old to the new one.
@@ -184,16 +202,15 @@ impl Seen {
         let turned = DQuat::from_scaled_axis(self.spin * step_s) * before.turn;
         let askew = turned.normalize().angle_between(self.turn.normalize());
         let spun = (self.spin - before.spin).length() * step_s;
-        if askew > PARTED_RAD + spun && (askew > LEANT_ON * PARTED_RAD + spun || !touched()) {
+        if beyond(askew - spun, PARTED_RAD, LEANT_ON[1]) {
             return Some(format!("a body was turned by {askew:.3} rad without a spin{}", self.at()));
         }
         // A hard push alone must not add up to a drift.
         let unexplained = if off.length() > fast { off * (1.0 - fast / off.length()) } else { DVec3::ZERO };
-        self.drift = (before.drift + unexplained) * REMEMBERED;
-        if off.length() > PARTED_M + fast {
-            self.drift = DVec3::ZERO;
+        if beyond(off.length() - fast, PARTED_M, LEANT_ON[0]) {
             return Some(format!("a body was moved by {:.1} mm without a velocity{}", off.length() * 1e3, self.at()));
         }
+        self.drift = (before.drift + unexplained) * REMEMBERED;
         if self.drift.length() > DRIFT_M {
             let drift = std::mem::take(&mut self.drift);
             return Some(format!("a body drifted by {:.1} mm without a velocity{}", drift.length() * 1e3, self.at()));
@@ -222,6 +239,21 @@ impl Seen {
 fn is_jointed(physics: &PhysicsWorld, handle: RigidBodyHandle) -> bool {
     physics.impulse_joints.attached_joints(handle).next().is_some()
         || physics.multibody_joints.rigid_body_link(handle).is_some()
+}
+
+/// The bodies that the robot's touch, and what hangs on them.
+fn touched_by(physics: &PhysicsWorld, robot: &[RigidBodyHandle]) -> Vec<RigidBodyHandle> {
+    let colliders = robot.iter().filter_map(|part| physics.bodies.get(*part)).flat_map(|part| part.colliders());
+    let pairs = colliders.flat_map(|collider| physics.contact_pairs_with(*collider));
+    let touching = pairs.filter(|pair| pair.has_any_active_contact());
+    let parents = touching.flat_map(|pair| [pair.collider1, pair.collider2]).filter_map(|at| physics.colliders.get(at));
+    let mut touched: Vec<RigidBodyHandle> =
+        parents.filter_map(|collider| collider.parent()).filter(|body| !robot.contains(body)).collect();
+    let joints =
+        |body: &RigidBodyHandle| physics.impulse_joints.attached_joints(*body).map(|(one, other, ..)| [one, other]);
+    let hanging: Vec<RigidBodyHandle> = touched.iter().flat_map(joints).flatten().collect();
+    touched.extend(hanging);
+    touched
 }
 
 /// Whether something touches a body that moves: the robot, a third party, another body.
@@ -333,7 +365,7 @@ mod tests {
         let mut audit = Audit::default();
         let hand = |x: f64, left: f64, right: f64| {
             let pads_n = [DVec3::Y * left, DVec3::NEG_Y * right];
-            [Hand { at: DVec3::X * x, pads_n, max_speed_m_s: 0.5, max_grip_n: 40.0 }]
+            [Hand { at: DVec3::X * x, pads_n, wrist_n: 0.0, max_speed_m_s: 0.5, max_grip_n: 40.0 }]
         };
         for x in [0.0, 0.002, 0.02] {
             audit.step(&world.physics, &[], &hand(x, 0.0, 0.0), x);

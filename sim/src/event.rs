@@ -77,8 +77,15 @@ impl Event {
         }
     }
 
-    /// Goes on by one physics step.
-    pub(crate) fn step(&mut self, world: &mut PhysicsWorld, bodies: &mut [Body], state: &[f64], now_s: f64) {
+    /// Goes on by one physics step. Says which object it has just set down, if any: its parts were set with it.
+    pub(crate) fn step(
+        &mut self,
+        world: &mut PhysicsWorld,
+        bodies: &mut [Body],
+        state: &[f64],
+        now_s: f64,
+    ) -> Option<usize> {
+        let was_acting = matches!(self.phase, Phase::Acting(..));
         self.phase = match self.phase {
             Phase::Waiting if self.when.as_ref().is_none_or(|when| when.holds(state)) => {
                 Phase::Timed(now_s + self.after_s)
@@ -91,6 +98,10 @@ impl Event {
             }
             other => other,
         };
+        match self.deed {
+            Deed::Carry { body, .. } if was_acting && matches!(self.phase, Phase::Done) => Some(body),
+            _ => None,
+        }
     }
 
     /// Whether it hides the world from a camera now.

@@ -199,9 +199,9 @@ impl World {
     /// One physics step; `fraction` is the share of the control tick that is behind after it.
     fn step(&mut self, fraction: f64) {
         let now_s = self.seconds();
-        for event in &mut self.events {
-            event.step(&mut self.physics, &mut self.bodies, &self.state, now_s);
-        }
+        let step = |event: &mut Event| event.step(&mut self.physics, &mut self.bodies, &self.state, now_s);
+        let set_down: Vec<usize> = self.events.iter_mut().filter_map(step).collect();
+        set_down.into_iter().for_each(|body| self.excuse(body));
         for body in &self.bodies {
             body.act(&mut self.physics, &self.state);
         }

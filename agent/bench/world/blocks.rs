@@ -150,7 +150,9 @@ pub fn measure(args: &BenchArgs, result: &mut BenchResult) -> anyhow::Result<()>
     let mut spread = |name: &str, of: fn(&Outcome) -> f64| {
         let values: Vec<f64> = outcomes.iter().map(|outcome| 1e3 * of(outcome)).collect();
         let ((p50, p99), (_, most)) = (median_and(0.99, &values), median_and(1.0, &values));
-        result.rows.push(Row::new(name, [("p50_mm", p50), ("p99_mm", p99), ("max_mm", most)]));
+        let worst = values.iter().position(|value| *value >= most).unwrap_or_default() as f64;
+        let row = [("p50_mm", p50), ("p99_mm", p99), ("max_mm", most), ("max_at_seed", worst)];
+        result.rows.push(Row::new(name, row));
         most
     };
     let slip = spread("cubes: slip in the hand", |outcome| outcome.slip_m);

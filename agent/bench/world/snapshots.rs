@@ -40,6 +40,8 @@ pub fn measure(args: &BenchArgs, result: &mut BenchResult) -> anyhow::Result<()>
         mismatches += found.mismatches;
         seen += found.seen;
         violations += found.audit.violations;
+        let label = |told: &str| format!("{} seed {seed}: {told}", world.name());
+        result.notes.extend(found.told.iter().map(|told| label(told)));
         result
             .notes
             .extend(found.audit.first.iter().map(|told| format!("audit, {} seed {seed}: {told}", world.name())));
@@ -61,6 +63,8 @@ pub fn measure(args: &BenchArgs, result: &mut BenchResult) -> anyhow::Result<()>
 #[derive(Default)]
 struct Found {
     mismatches: usize,
+    /// What did not come back, of each mismatch.
+    told: Vec<String>,
     seen: usize,
     audit: AuditReport,
 }
@@ -78,6 +82,18 @@ struct Moment {
     hash: u64,
     everything: Vec<u8>,
     frame: Option<RgbdFrame>,
+}
+
+impl Moment {
+    /// What of it is not as in another one, the coarsest first.
+    fn difference(&self, other: &Moment) -> Option<&'static str> {
+        let differs = [
+            ("the world's motion", self.hash != other.hash),
+            ("what is kept besides", self.everything != other.everything),
+            ("the frame", self.frame != other.frame),
+        ];
+        differs.into_iter().find(|(_, differs)| *differs).map(|(what, _)| what)
+    }
 }
 
 struct Player {
@@ -135,15 +151,18 @@ fn episode(scenario: &Scenario, seed: u64, renderer: Option<&SharedRenderer>) ->
         second.simulation.restore(&Snapshot::from_bytes(point.snapshot.as_bytes().to_vec())?)?;
         for (tick, command) in commands.iter().enumerate().skip(point.tick).take(GO_ON) {
             second.robot.command(command)?;
-            // The first time, frames were taken at other points on the way.
-            let others =
-                points.iter().enumerate().filter(|(other, at)| *other != number && at.tick + GO_ON == tick + 1);
+            // The first time, frames were taken at other points on the way, those of the same moment in their order.
+            let before = |other: usize| if tick + 1 == point.tick + GO_ON { other < number } else { other != number };
+            let others = points.iter().enumerate().filter(|(other, at)| before(*other) && at.tick + GO_ON == tick + 1);
             for (other, _) in others {
                 drop(second.moment(looks(other))?);
             }
         }
         let after = second.moment(looks(number))?;
-        found.mismatches += usize::from(point.after.as_ref() != Some(&after));
+        if let Some(what) = point.after.as_ref().map_or(Some("all"), |before| before.difference(&after)) {
+            found.mismatches += 1;
+            found.told.push(format!("{what} went on otherwise from tick {}", point.tick));
+        }
         found.seen += usize::from(after.frame.is_some());
     }
     Ok(found)

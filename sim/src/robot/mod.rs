@@ -186,6 +186,7 @@ impl Robot {
             audit::Hand {
                 at: tcp.translation,
                 pads_n: limb.forces.mean().0.map(|force| tcp.inverse().transform_vector(force)),
+                wrist_n: limb.forces.mean().1.length(),
                 max_speed_m_s: limb.robot.max_speed_m_s,
                 max_grip_n: limb.robot.max_grip_force_n,
             }
@@ -239,7 +240,7 @@ impl Limb {
 
     fn drive(&mut self, world: &mut PhysicsWorld, fraction: f64, drops: bool) {
         (self.before, self.at) = (self.at, self.from.towards(&self.to, fraction, &self.robot));
-        self.wrist.drive(world, &self.at.tcp);
+        self.wrist.drive(world, &self.at.tcp, &self.robot);
         if let (Some(links), Some(arm), Some(joints)) = (&self.links, &self.robot.arm, &self.at.joints) {
             links.drive(world, &arm.frames(joints));
         }
