@@ -12,6 +12,7 @@
 //! | [`event`] | the events of which memory is the sum; the log's content |
 //! | [`geometry`], [`scene`], [`moves`] | shapes, relations between them, moves read out of a history |
 //! | [`inspect`] | small summaries for people and tools |
+//! | [`FeltJoint`] | a part's hinge or slide as the hand that moved it felt it |
 //!
 //! [`AcmMemory`] is the implementation, in memory or over a folder; the library of templates comes from
 //! [`default_library`] or [`library_from_dir`].
@@ -27,6 +28,7 @@ pub mod geometry;
 mod hand;
 mod identity;
 pub mod inspect;
+mod joint;
 mod library;
 mod log;
 mod memory;
@@ -49,6 +51,7 @@ mod view;
 
 pub use hand::HandFeeling;
 pub use identity::{IdentityRule, MAX_PERCEPTS};
+pub use joint::FeltJoint;
 pub use library::{LibraryError, MAX_TEMPLATE_FILES, default_library, library_from_dir};
 pub use log::{FORMAT, MAX_LOG_BYTES};
 pub use memory::AcmMemory;

@@ -2,13 +2,14 @@
 
 use crate::{
     entry::{ObjectEntry, SkillEntry, TaskProgress, Transition},
+    joint::{self, FeltJoint},
     observation::{Executed, Grounding, Note, Observation, Verdict},
     query::{Applicability, ObjectQuery, PlaceReference, Prediction, Recall, Retrieval, SkillCandidate},
     recent::Recent,
 };
 use acm_concept::{
     expectation::Expectation,
-    ids::{ObjectId, TransitionId},
+    ids::{ObjectId, PartId, TransitionId},
     literal::{Belief, Literal, Place},
     object::SupportPlane,
     template::TemplateLibrary,
@@ -117,6 +118,11 @@ pub trait MemoryView: Send + Sync {
     }
     /// What a skill is expected to bring about, from declared effects and past transitions.
     fn predict(&self, candidate: &SkillCandidate) -> Prediction;
+
+    /// The hinge or slide of a part as the last hand that moved it felt it, in the part's frame.
+    fn felt_joint(&self, part: PartId) -> Option<FeltJoint> {
+        joint::felt_joint(self, part)
+    }
 
     /// One object.
     fn object(&self, id: ObjectId) -> Option<&ObjectEntry> {

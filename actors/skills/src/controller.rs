@@ -128,7 +128,7 @@ const KINDS: &[(&str, Start)] = &[
         false => Ok(run(i, grasp_from_above::GraspFromAbove::plan(i, &h, f)?, h)),
     }),
     ("hinge-close", |i, h, _| close_it(i, h, HINGED)),
-    ("hinge-open", |i, h, _| Ok(run(i, Sequence::new(open::plan(i, &h, HINGED)?), h))),
+    ("hinge-open", |i, h, _| open_it(i, h, HINGED)),
     ("insert-along", |i, h, f| Ok(run(i, Sequence::new(insert_along::InsertAlong::plan(i, &h, f)?), h))),
     ("move-to", |i, h, _| Ok(run(i, Sequence::new(move_to::plan(i, &h)?), h))),
     ("place-upright", |i, h, f| Ok(run(i, place_upright::PlaceUpright::plan(i, &h, f)?, h))),
@@ -140,9 +140,17 @@ const KINDS: &[(&str, Start)] = &[
     ("release", |i, h, _| Ok(run(i, Sequence::new(release::Release::plan(i)?), h))),
     ("rotate", |i, h, _| Ok(run(i, Sequence::new(rotate::plan(i, &h)?), h))),
     ("slide-close", |i, h, _| close_it(i, h, SLIDING)),
-    ("slide-open", |i, h, _| Ok(run(i, Sequence::new(open::plan(i, &h, SLIDING)?), h))),
+    ("slide-open", |i, h, _| open_it(i, h, SLIDING)),
     ("turn", |i, h, _| Ok(run(i, Sequence::new(turn::plan(i, &h)?), h))),
 ];
+
+/// By its handle where there is one to take, else by its edge.
+fn open_it(invocation: &SkillInvocation, hand: Hand, jointed: Jointed) -> Result<Box<dyn Controller>, StartError> {
+    match invocation.arguments.contains_key("grip_width") {
+        true => Ok(run(invocation, Sequence::new(open::draw(invocation, &hand, jointed)?), hand)),
+        false => Ok(run(invocation, Sequence::new(open::drag(invocation, &hand, jointed)?), hand)),
+    }
+}
 
 /// By its handle where there is one to take, else by a push from outside.
 fn close_it(invocation: &SkillInvocation, hand: Hand, jointed: Jointed) -> Result<Box<dyn Controller>, StartError> {

@@ -16,7 +16,7 @@ use acm_concept::{
     pose::Pose,
     solid::{PlacedSolid, Solid},
 };
-use acm_sim::{TrueJoint, TrueLink, TrueObject, TruePiece};
+use acm_sim::{TrueJoint, TrueLink, TrueObject, TruePiece, TrueShape};
 use anyhow::{Context, Result};
 use glam::{DMat3, DQuat, DVec2, DVec3};
 use std::path::{Path, PathBuf};
@@ -25,9 +25,11 @@ const THING: ObjectId = ObjectId(1);
 /// The share of its way that counts as open; and how much farther the hand is told to go.
 pub const OPEN_SHARE: f64 = 0.75;
 const FARTHER_SHARE: f64 = 0.04;
+/// Most force at the wrist, newtons.
+pub const CAP_N: f64 = 60.0;
 /// Open by no more than this share counts as shut.
 pub const SHUT_SHARE: f64 = 0.05;
-/// A front that looks down by more than this share cannot be pushed from outside.
+/// A front that looks down by more than this share is drawn up rather than pushed.
 const BELOW: f64 = 0.25;
 /// A door's or drawer's front is at least so wide and high, metres; it goes at least so far, radians or metres.
 const FRONT_M: f64 = 0.07;
@@ -37,16 +39,20 @@ const LEAST_SLIDE_M: f64 = 0.08;
 const NARROWEST_M: f64 = 0.006;
 const TOUCHING_M: f64 = 0.002;
 /// Widest handle, metres.
-const WIDEST_M: f64 = 0.068;
+const WIDEST_M: f64 = 0.0735;
 /// Pieces whose front is this near to the foremost one are handles, if they stand out from the front by so much; metres.
 const FOREMOST_M: f64 = 0.02;
 const STANDS_OUT_M: f64 = 0.008;
+/// A part of which others cover this share is no outer one.
+const MOSTLY: f64 = 0.5;
 /// Half of the flat that closed finger tips need, metres.
 const FOOTPRINT_M: f64 = 0.014;
+/// Thickness of a finger with what it needs to open, and how deep it reaches beside a handle, metres.
+const FINGER_M: f64 = 0.018;
 /// Half of the palm's sides, metres; and how far the fingers reach beyond it.
 const PALM_M: DVec2 = DVec2::new(0.108, 0.038);
 const FINGERS_M: f64 = 0.04;
-/// The height of things that are not tall, metres: the hand must get under their handles.
+/// The height of things that are not tall, or have a door that drops, metres: the hand must get under their handles.
 const RAISED_M: f64 = 0.7;
 /// The hand waits at this height, or so much over the thing: it goes home over doors that stand open; metres.
 const HOME_M: f64 = 1.3;
@@ -128,9 +134,9 @@ pub struct Swing {
 }
 
 impl Swing {
-    /// Opened far enough and shut again.
+    /// Opened far enough and shut again, within the force that a wrist bears.
     pub fn good(&self) -> bool {
-        self.failure.is_none() && self.opened >= OPEN_SHARE && self.left <= SHUT_SHARE
+        self.failure.is_none() && self.most_n <= CAP_N && self.opened >= OPEN_SHARE && self.left <= SHUT_SHARE
     }
     /// One line.
     pub fn line(&self) -> String {
@@ -168,11 +174,13 @@ pub fn models(data: Option<&Path>) -> Vec<String> {
 /// The world cannot be built.
 pub fn run_model(model: &str) -> Result<Vec<Swing>> {
     let plain = Rig::new(&world(model, 0.0, 0.0), 0)?.object("thing")?;
-    let height_m = if plain.size_m.z > TALL_M { GROUND_M } else { RAISED_M };
+    let drops = (0..plain.links.len()).filter_map(|link| Front::of(&plain, link)).any(|front| front.drops());
+    let height_m = if plain.size_m.z > TALL_M && !drops { GROUND_M } else { RAISED_M };
     let text = world(model, height_m, height_m + plain.size_m.z);
     let thing = Rig::new(&text, 0)?.object("thing")?;
     let fronts: Vec<Front> = (0..thing.links.len()).filter_map(|link| Front::of(&thing, link)).collect();
-    let outer = fronts.iter().filter(|front| !fronts.iter().any(|other| other.hides(front)));
+    let hidden = |front: &Front| fronts.iter().map(|other| other.hides(front)).sum::<f64>();
+    let outer = fronts.iter().filter(|front| hidden(front) < MOSTLY);
     outer.map(|front| swing(model, &text, &thing, front)).collect()
 }
 
@@ -212,11 +220,15 @@ fn now(rig: &Rig, front: &Front) -> Result<TrueJoint> {
 }
 
 fn open(rig: &mut Rig, thing: &TrueObject, front: &Front) -> Result<(), String> {
-    let (frame, width_m) = front.handle().ok_or("it has no handle that the hand can take")?;
+    // By its handle, or where it has none by the edge that is far from its hinge.
+    let (frame, width_m) = match front.handle() {
+        Some((frame, width_m)) => (frame, Some(width_m)),
+        None => (front.edge().ok_or("it has neither a handle nor a free edge that the hand can take")?, None),
+    };
     let handles = front.handles(thing);
     let travel = (OPEN_SHARE + FARTHER_SHARE) * front.way;
     let mut arguments = front.joint_in(&frame);
-    arguments.push(("grip_width", width_m));
+    arguments.extend(width_m.map(|width_m| ("grip_width", width_m)));
     arguments.push((if front.is_hinge { "angle" } else { "travel" }, travel));
     let kind = if front.is_hinge { "hinge-open" } else { "slide-open" };
     let mut skill = invocation(kind, THING, thing.pose, frame, &arguments);
@@ -232,14 +244,12 @@ fn shut(rig: &mut Rig, shut_thing: &TrueObject, front: &Front) -> Result<(), Str
     let handles = front.handles(shut_thing);
     let turned = link.pose * front.closed.inverse();
     let travel = (joint.position - joint.closed).abs();
-    // Pushed shut from outside, unless outside is below, or it slides sideways: then drawn by its handle.
+    // Pushed shut from outside, unless outside is below, or it slides sideways: then drawn by its handle, if it has one.
     let below = turned.transform_vector(front.axes.z_axis).z < -BELOW;
     let sideways = !front.is_hinge && front.axis.dot(front.axes.z_axis).abs() < 0.5;
-    let (taken, width_m) = if below || sideways {
-        let (frame, width_m) = front.handle().ok_or("it has no handle that the hand can take")?;
-        (frame, Some(width_m))
-    } else {
-        (front.flat().ok_or("its front has no flat that the hand can press")?, None)
+    let (taken, width_m) = match front.handle().filter(|_| below || sideways) {
+        Some((frame, width_m)) => (frame, Some(width_m)),
+        None => (front.flat().ok_or("its front has no flat that the hand can press")?, None),
     };
     let mut arguments = front.joint_in(&taken);
     arguments.push((if front.is_hinge { "angle" } else { "travel" }, travel));
@@ -283,8 +293,43 @@ impl Piece {
         let apart = (self.low - other.high).max(other.low - self.high);
         apart.max_element() < TOUCHING_M
     }
+    /// The box round some points; `None` without any.
+    fn round(points: impl Iterator<Item = DVec3>) -> Option<Piece> {
+        points.fold(None, |all: Option<Piece>, at| {
+            let Piece { low, high } = all.unwrap_or(Piece { low: at, high: at });
+            Some(Piece { low: low.min(at), high: high.max(at) })
+        })
+    }
+    /// The direction of its narrow side: right or up.
+    fn across(&self) -> DVec3 {
+        if self.size().x <= self.size().y { DVec3::X } else { DVec3::Y }
+    }
+    fn area(&self) -> f64 {
+        self.size().x * self.size().y
+    }
     fn covers(&self, right: f64, up: f64) -> bool {
         (self.low.x..=self.high.x).contains(&right) && (self.low.y..=self.high.y).contains(&up)
+    }
+}
+
+/// What stands out from a front, and the hulls that it is made of.
+#[derive(Debug, Clone)]
+struct Handle {
+    bounds: Piece,
+    hulls: Vec<Vec<DVec3>>,
+}
+
+impl Handle {
+    /// What of it lies between the fingers at places along it, the one in its middle first: as broad as a finger.
+    fn stations(&self) -> Vec<Piece> {
+        const SHARES: [f64; 9] = [0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8, 0.1, 0.9];
+        let along = DVec3::ONE.with_z(0.0) - self.bounds.across();
+        let (low, length) = (self.bounds.low.dot(along), self.bounds.size().dot(along));
+        let station = |share: f64| {
+            let at = low + share * length;
+            Piece::round(self.hulls.iter().flat_map(|hull| cut(hull, along, at - FOOTPRINT_M, at + FOOTPRINT_M)))
+        };
+        SHARES.into_iter().filter_map(station).collect()
     }
 }
 
@@ -302,8 +347,12 @@ struct Front {
     /// A point of the hinge, and the direction about which, or along which, it opens; world frame.
     origin: DVec3,
     axis: DVec3,
-    /// Its pieces, along right, up and out.
+    /// The boxes round its pieces, along right, up and out.
     pieces: Vec<Piece>,
+    /// The boxes round the pieces of other parts, all shut.
+    others: Vec<Piece>,
+    /// Points whose convex hulls its pieces are, in the same coordinates and order.
+    hulls: Vec<Vec<DVec3>>,
 }
 
 impl Front {
@@ -332,6 +381,15 @@ impl Front {
         let out = if joint.is_hinge { snapped(axis.cross(middle - joint.origin), thing.pose.rotation) } else { ahead };
         let up = if out.z.abs() > 0.5 { snapped(DVec3::X, thing.pose.rotation) } else { DVec3::Z };
         let axes = DMat3::from_cols(up.cross(out), up, out);
+        let foreign = (0..thing.links.len()).filter(|at| carrier(thing, *at) != index);
+        let foreign = foreign.filter_map(|at| thing.links.get(at));
+        let boxes = |link: &TrueLink| {
+            let boxes = link.pieces.iter().map(|piece| seen(&link.pose, piece.low, piece.high, &axes));
+            boxes.collect::<Vec<Piece>>()
+        };
+        let others = foreign.flat_map(boxes).collect();
+        let own_pieces = own.iter().flat_map(|link| link.pieces.iter().map(|piece| (link.pose, piece)));
+        let hulls = own_pieces.map(|(pose, piece)| hull(&pose, piece, &axes)).collect();
         let pieces = corners.iter().map(|(pose, low, high)| seen(pose, *low, *high, &axes)).collect();
         let front = Front {
             link: index,
@@ -342,6 +400,8 @@ impl Front {
             origin: joint.origin,
             axis,
             pieces,
+            others,
+            hulls,
         };
         let size = front.bounds().size();
         (size.x.min(size.y) >= FRONT_M).then_some(front)
@@ -354,14 +414,19 @@ impl Front {
             .fold(start, |all, piece| Piece { low: all.low.min(piece.low), high: all.high.max(piece.high) })
     }
 
-    /// Whether this front stands before another part.
-    fn hides(&self, other: &Front) -> bool {
+    /// Whether it opens downwards.
+    fn drops(&self) -> bool {
+        self.is_hinge && self.axis.z.abs() < 0.5 && self.origin.z < (self.axes * self.bounds().middle()).z
+    }
+
+    /// The share of another part's front that this one stands before.
+    fn hides(&self, other: &Front) -> f64 {
         let (mine, theirs) = (self.bounds(), other.bounds());
-        let middle = theirs.middle();
-        self.link != other.link
+        let before = self.link != other.link
             && (self.axes.z_axis - other.axes.z_axis).length() < 0.1
-            && mine.covers(middle.x, middle.y)
-            && mine.middle().z > theirs.high.z - FOREMOST_M
+            && mine.middle().z > theirs.high.z - FOREMOST_M;
+        let shared = (mine.high.min(theirs.high) - mine.low.max(theirs.low)).max(DVec3::ZERO);
+        if before { shared.x * shared.y / theirs.area().max(1e-9) } else { 0.0 }
     }
 
     /// How far a place is from the hinge, seen from before it; for a slide how near it is to the middle.
@@ -374,50 +439,137 @@ impl Front {
         (at - self.origin).reject_from_normalized(self.axis).length()
     }
 
-    /// The boxes of what stands out from the front: pieces that touch each other together make a handle.
-    fn standing_out(&self) -> Vec<Piece> {
-        let panel = self.panel();
-        let out = self.pieces.iter().filter(|piece| piece.high.z > panel + STANDS_OUT_M);
-        let mut boxes: Vec<Piece> = Vec::new();
-        for piece in out {
-            let mut joined = *piece;
-            // Boxes that the new one touches become one with it.
-            let (touched, apart): (Vec<Piece>, Vec<Piece>) = boxes.into_iter().partition(|other| joined.touches(other));
+    /// What stands out beyond a level: what touches each other together makes a handle.
+    fn standing_out(&self, level: f64) -> Vec<Handle> {
+        let mut handles: Vec<Handle> = Vec::new();
+        for hull in &self.hulls {
+            let points = cut(hull, DVec3::Z, level, level + FRONT_M);
+            let Some(bounds) = Piece::round(points.iter().copied()) else { continue };
+            let mut joined = Handle { bounds, hulls: vec![points] };
+            // Those that the new one touches become one with it.
+            let (touched, apart): (Vec<Handle>, Vec<Handle>) =
+                handles.into_iter().partition(|other| joined.bounds.touches(&other.bounds));
             for other in touched {
-                joined = Piece { low: joined.low.min(other.low), high: joined.high.max(other.high) };
+                let (low, high) = (joined.bounds.low.min(other.bounds.low), joined.bounds.high.max(other.bounds.high));
+                joined.bounds = Piece { low, high };
+                joined.hulls.extend(other.hulls);
             }
-            boxes = apart;
-            boxes.push(joined);
+            handles = apart;
+            handles.push(joined);
         }
-        boxes
+        handles
     }
 
-    /// The frame in which the handle is taken, and its width: a piece of it that is alone narrow enough, like the bar
-    /// between its feet, or all of it together, like a shell of many pieces.
+    /// The frame in which the handle is taken, and its width: near the middle of what stands out, where it is narrow enough.
     fn handle(&self) -> Option<(Pose, f64)> {
         let foremost = self.bounds().high.z;
-        let panel = self.panel();
-        let graspable = |piece: &Piece| {
-            let size = piece.size();
-            piece.high.z > foremost - FOREMOST_M
-                && piece.high.z > panel + STANDS_OUT_M
-                && size.x.min(size.y) < WIDEST_M
-                && size.x.max(size.y) > NARROWEST_M
-        };
-        let merit = |piece: &Piece| {
-            let (size, middle) = (piece.size(), piece.middle());
-            // Of pieces that are alike, the longer: the bar, not its feet.
+        let least = self.panel() + STANDS_OUT_M;
+        // A low level shows all of a handle; a higher one parts it from a frame that stands out as well.
+        let levels = [least, foremost - FOREMOST_M, foremost - 0.6 * FOREMOST_M];
+        let (taken, across) = levels.into_iter().filter(|level| *level >= least).find_map(|level| self.grip(level))?;
+        let (size, middle) = (taken.size(), taken.middle());
+        let tips = taken.high.z - self.ground(&taken, across) - 0.014;
+        let deep = (0.5 * size.z).min(0.015).min(tips).max(0.003);
+        let at = self.axes * DVec3::new(middle.x, middle.y, taken.high.z - deep);
+        Some((framed(at, self.axes * across, self.axes.z_axis), size.dot(across)))
+    }
+
+    /// What is taken of what stands out beyond a level, and across what the fingers close: the longest handle far from the
+    /// hinge first.
+    fn grip(&self, level: f64) -> Option<(Piece, DVec3)> {
+        let foremost = self.bounds().high.z;
+        let merit = |handle: &Handle| {
+            let (size, middle) = (handle.bounds.size(), handle.bounds.middle());
             size.x.max(size.y) + 0.2 * self.merit(middle.x, middle.y)
         };
-        let whole = self.standing_out();
-        let candidates = if whole.iter().any(graspable) { whole } else { self.pieces.clone() };
-        let best = candidates.into_iter().filter(graspable).max_by(|a, b| merit(a).total_cmp(&merit(b)))?;
-        let (size, middle) = (best.size(), best.middle());
-        let deep = (0.5 * size.z).min(0.015).min(best.high.z - panel - 0.014).max(0.003);
-        let at = self.axes * DVec3::new(middle.x, middle.y, best.high.z - deep);
-        // The fingers close across its narrow side.
-        let across = if size.x <= size.y { self.axes.x_axis } else { self.axes.y_axis };
-        Some((framed(at, across, self.axes.z_axis), size.x.min(size.y)))
+        let mut handles = self.standing_out(level);
+        handles.sort_by(|a, b| merit(b).total_cmp(&merit(a)));
+        handles.into_iter().find_map(|handle| {
+            let narrow = handle.bounds.across();
+            // Across its narrow side, or where that leaves the fingers no room, as between two doors, along it.
+            let takes = [narrow, DVec3::ONE.with_z(0.0) - narrow].map(|across| {
+                let stands = |piece: &&Piece| {
+                    let size = piece.size();
+                    piece.high.z > foremost - FOREMOST_M
+                        && size.x.max(size.y) > NARROWEST_M
+                        && size.dot(across) < WIDEST_M
+                        && self.leaves_room(piece, across)
+                };
+                let whole = if across == narrow { handle.stations() } else { vec![handle.bounds] };
+                whole.iter().find(stands).map(|piece| (*piece, across))
+            });
+            takes.into_iter().flatten().next()
+        })
+    }
+
+    /// Where the two fingers come to be beside a handle.
+    fn beside(&self, handle: &Piece, across: DVec3) -> [Piece; 2] {
+        let along = DVec3::ONE.with_z(0.0) - across;
+        let reach_m = 0.5 * handle.size().dot(across) + 0.5 * FINGER_M;
+        [-1.0, 1.0].map(|side| {
+            let at = handle.middle() + side * reach_m * across;
+            let half = 0.5 * FINGER_M * across + FOOTPRINT_M * along;
+            Piece { low: (at - half).with_z(handle.high.z - FINGER_M), high: (at + half).with_z(handle.high.z) }
+        })
+    }
+
+    /// Whether no other part stands where the fingers come to be.
+    fn leaves_room(&self, handle: &Piece, across: DVec3) -> bool {
+        !self.beside(handle, across).iter().any(|finger| {
+            self.others.iter().any(|other| {
+                let shared = other.high.min(finger.high) - other.low.max(finger.low);
+                shared.min_element() > 0.0
+            })
+        })
+    }
+
+    /// How far out the front is beside a handle.
+    fn ground(&self, handle: &Piece, across: DVec3) -> f64 {
+        let lower = self.pieces.iter().filter(|piece| piece.high.z < handle.high.z - NARROWEST_M);
+        let spread =
+            |finger: Piece| Piece { low: finger.low - FINGER_M * across, high: finger.high + FINGER_M * across };
+        let fingers = self.beside(handle, across).map(spread);
+        let under = |piece: &&Piece| {
+            let shares = |finger: &Piece| piece.high.min(finger.high) - piece.low.max(finger.low);
+            // What is under the handle itself is in nobody's way.
+            let aside = piece.low.dot(across) < handle.low.dot(across) - TOUCHING_M
+                || piece.high.dot(across) > handle.high.dot(across) + TOUCHING_M;
+            aside && fingers.iter().map(shares).any(|shared| shared.x.min(shared.y) > TOUCHING_M)
+        };
+        lower.filter(under).map(|piece| piece.high.z).fold(self.panel(), f64::max)
+    }
+
+    /// The frame on the narrow face at the edge that is far from the hinge, where nothing else is before that face.
+    fn edge(&self) -> Option<Pose> {
+        const SHARES: [f64; 5] = [0.5, 0.35, 0.65, 0.2, 0.8];
+        const RIM_M: f64 = 0.006;
+        let bounds = self.bounds();
+        let (middle, half) = (bounds.middle(), 0.5 * bounds.size().with_z(0.0));
+        let sides = [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y];
+        let far = |side: &DVec3| self.merit(middle.x + side.x * half.x, middle.y + side.y * half.y);
+        let side = sides.into_iter().filter(|_| self.is_hinge).max_by(|a, b| far(a).total_cmp(&far(b)))?;
+        let along = DVec3::ONE.with_z(0.0) - side.abs();
+        let edge = side.dot(middle + side * half);
+        let place = |share: f64| {
+            let at = middle + side * half + (2.0 * share - 1.0) * along * half;
+            let beside = at.dot(along);
+            // What of the part there is just inside its edge.
+            let rim = |hull: &Vec<DVec3>| {
+                let outer = cut(hull, side, edge - RIM_M, edge + RIM_M);
+                cut(&outer, along, beside - FOOTPRINT_M, beside + FOOTPRINT_M)
+            };
+            let rim = Piece::round(self.hulls.iter().flat_map(rim))?;
+            Some(at.with_z(rim.middle().z))
+        };
+        let free = |at: &DVec3| {
+            let reach = at + side * FINGERS_M;
+            let margin = FOOTPRINT_M * along + 0.5 * NARROWEST_M * DVec3::Z;
+            let tip = Piece { low: at.min(reach) - margin, high: at.max(reach) + margin };
+            let beyond = |other: &Piece| (other.high - *at).dot(side).max((other.low - *at).dot(side)) > TOUCHING_M;
+            !self.others.iter().any(|other| other.touches(&tip) && beyond(other))
+        };
+        let at = SHARES.into_iter().filter_map(place).find(free)?;
+        Some(framed(self.axes * at, self.axes.z_axis, self.axes * side))
     }
 
     /// The pieces of the shut thing that stand out from this front: link and number.
@@ -435,8 +587,7 @@ impl Front {
 
     /// How far out the front's largest piece reaches.
     fn panel(&self) -> f64 {
-        let area = |piece: &&Piece| piece.size().x * piece.size().y;
-        self.pieces.iter().max_by(|a, b| area(a).total_cmp(&area(b))).map_or(0.0, |piece| piece.high.z)
+        self.pieces.iter().max_by(|a, b| a.area().total_cmp(&b.area())).map_or(0.0, |piece| piece.high.z)
     }
 
     /// How far out the front is at a place.
@@ -536,6 +687,42 @@ fn seen(pose: &Pose, low: DVec3, high: DVec3, axes: &DMat3) -> Piece {
     });
     let start = Piece { low: DVec3::MAX, high: DVec3::MIN };
     corners.fold(start, |all, corner| Piece { low: all.low.min(corner), high: all.high.max(corner) })
+}
+
+/// The points whose convex hull a piece is, seen along other axes.
+fn hull(pose: &Pose, piece: &TruePiece, axes: &DMat3) -> Vec<DVec3> {
+    let place = |at: DVec3| axes.transpose() * pose.transform_point(at);
+    match &piece.shape {
+        TrueShape::Hull { points } => {
+            points.iter().map(|point| place(piece.pose.transform_point(point.as_dvec3()))).collect()
+        }
+        _ => {
+            let pick = |from_high: bool, low: f64, high: f64| if from_high { high } else { low };
+            let corner = |i: u8| {
+                let [x, y, z] = [i & 1 > 0, i & 2 > 0, i & 4 > 0];
+                let (low, high) = (piece.low, piece.high);
+                place(DVec3::new(pick(x, low.x, high.x), pick(y, low.y, high.y), pick(z, low.z, high.z)))
+            };
+            (0..8).map(corner).collect()
+        }
+    }
+}
+
+/// Points whose convex hull is what of a hull lies between two places along an axis: its own points there, and where the
+/// lines between its points enter and leave.
+fn cut(hull: &[DVec3], along: DVec3, from: f64, to: f64) -> Vec<DVec3> {
+    let mut points: Vec<DVec3> = hull.iter().copied().filter(|at| (from..=to).contains(&at.dot(along))).collect();
+    for (index, a) in hull.iter().enumerate() {
+        for b in hull.iter().skip(index + 1) {
+            for plane in [from, to] {
+                let (below, above) = (a.dot(along) - plane, b.dot(along) - plane);
+                if below * above < 0.0 {
+                    points.push(a.lerp(*b, below / (below - above)));
+                }
+            }
+        }
+    }
+    points
 }
 
 /// The frame with this origin, y and z.

@@ -13,7 +13,7 @@ use acm_concept::{
     skill::SkillInvocation,
     solid::PlacedSolid,
 };
-use acm_memory::{MemoryView, entry::Presence};
+use acm_memory::{FeltJoint, MemoryView, entry::Presence};
 use glam::DVec3;
 use std::collections::BTreeMap;
 use thiserror::Error;
@@ -85,7 +85,10 @@ pub(crate) fn bind(step: &Step, view: &dyn MemoryView, robot: &RobotDescription)
     let unknown = || BindError::UnknownPart { skill: skill.clone(), part: part_id };
     let entry = view.object(part_id.object).ok_or_else(unknown)?;
     let part = entry.parts.get(part_id.index as usize).ok_or_else(unknown)?;
-    let (frame, arguments) = evaluate(&skill, part_id, part, view)?;
+    let (frame, mut arguments) = evaluate(&skill, part_id, part, view)?;
+    if let Some(felt) = view.felt_joint(part_id) {
+        know_joint(&candidate.kind, &felt.seen_from(&part.pose.pose, &frame), &mut arguments);
+    }
     check_reach(step, part, &frame, robot)?;
     let support_height_m = match &candidate.destination {
         Some(place) => surface_height(view, place.support, place.pose.translation),
@@ -134,6 +137,24 @@ fn evaluate(
     Ok((part.pose.pose * local, arguments))
 }
 
+/// A joint that was felt once is better known than what the template makes of what was seen: it takes the place of the
+/// `hinge_*` and `axis_*` of the kinds that follow a joint. `felt` is in the function's frame.
+fn know_joint(kind: &str, felt: &FeltJoint, arguments: &mut BTreeMap<String, f64>) {
+    let mut vector = |name: &str, value: DVec3| {
+        for (axis, value) in ["x", "y", "z"].into_iter().zip(value.to_array()) {
+            arguments.insert(format!("{name}_{axis}"), value);
+        }
+    };
+    match felt.point {
+        Some(point) if kind.starts_with("hinge-") => {
+            vector("hinge", point);
+            vector("axis", felt.axis);
+        }
+        None if kind.starts_with("slide-") => vector("axis", felt.axis),
+        _ => {}
+    }
+}
+
 /// Only the spot seen from above is checked: how high the hand must go is the controller's business.
 fn check_reach(step: &Step, part: &GroundedPart, frame: &Pose, robot: &RobotDescription) -> Result<(), BindError> {
     let spot = step.candidate.destination.map_or(frame.translation, |place| place.pose.translation);
@@ -178,4 +199,27 @@ fn held(view: &dyn MemoryView) -> Option<(ObjectId, Pose, GroundedPart)> {
     let reports = view.transitions().iter().rev().filter_map(|transition| transition.report.held);
     let (_, pose) = reports.into_iter().find(|(object, _)| *object == entry.id)?;
     Some((entry.id, pose, part))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use acm_concept::ids::TransitionId;
+
+    #[test]
+    fn a_felt_joint_takes_the_place_of_the_templates() {
+        let felt =
+            FeltJoint { evidence: TransitionId(1), point: Some(DVec3::new(0.3, 0.0, -0.04)), axis: DVec3::NEG_Y };
+        let template = || BTreeMap::from([("angle".to_string(), 1.2), ("hinge_x".to_string(), 0.25)]);
+        let mut arguments = template();
+        know_joint("hinge-open", &felt, &mut arguments);
+        assert_eq!((arguments["hinge_x"], arguments["hinge_z"], arguments["axis_y"]), (0.3, -0.04, -1.0));
+        assert_eq!(arguments["angle"], 1.2);
+        // A hinge tells a slide nothing, nor a press.
+        for kind in ["slide-open", "press"] {
+            let mut arguments = template();
+            know_joint(kind, &felt, &mut arguments);
+            assert_eq!(arguments, template());
+        }
+    }
 }

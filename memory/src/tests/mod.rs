@@ -4,6 +4,7 @@
 mod durability;
 mod episodes;
 mod identity;
+mod joints;
 mod places;
 mod retrieval;
 mod staplers;

@@ -8,15 +8,17 @@
 //! - A mass is believed if it makes the link's density 20 to 8000 kg/m3 and, of what moves, is at most 25 kg; otherwise
 //!   it is the volume times 500 kg/m3, kept within 5 g and 25 kg, or 60 kg of what does not move. Inertia comes from
 //!   the shapes.
+//! - A door that its own weight would swing off its closed position has a catch, as ovens and microwaves do: it holds the
+//!   door shut with 1.2 times the moment of that weight.
 //!
 //! The *reach* is how far the link extends from its hinge's axis.
 
 use super::{
     Link, Weight,
-    joint::{Follows, Joint, JointKind},
+    joint::{Follows, Joint, JointKind, Latch},
 };
 use acm_concept::pose::Pose;
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use rand::Rng;
 
 /// Force at the reach, newtons.
@@ -24,6 +26,12 @@ const FORCE_N: [f64; 2] = [2.0, 15.0];
 const HINGE_N_M: [f64; 2] = [0.2, 2.0];
 const MAX_DAMPING: f64 = 5.0;
 const BELIEVED_KG_M3: [f64; 2] = [20.0, 8000.0];
+/// A catch holds within this of the closed position, radians, with the weight's moment times this.
+const CATCH_RAD: f64 = 0.03;
+const CATCH_SHARE: f64 = 1.2;
+/// A moment above this share of the friction is not surely held by it.
+const HELD_SHARE: f64 = 0.8;
+const GRAVITY_M_S2: f64 = 9.81;
 const USUAL_KG_M3: f64 = 500.0;
 const LEAST_KG: f64 = 0.005;
 const MOST_KG: f64 = 60.0;
@@ -61,6 +69,25 @@ pub(crate) fn joint(link: &Link, joint: &mut Joint, original: &Original, rng: &m
     // A mechanism that follows another joint is moved with little force and has none of its own.
     joint.friction = if matches!(joint.follows, Some(Follows::Joint { .. })) { 0.0 } else { friction };
     joint.damping = damping.min(most);
+    if joint.latch.is_none() && joint.follows.is_none() {
+        joint.latch = catch(link, joint);
+    }
+}
+
+/// The catch of a door whose weight would open it in spite of its friction, in an object that stands upright.
+fn catch(link: &Link, joint: &Joint) -> Option<Latch> {
+    let [low, high] = joint.range.filter(|_| joint.kind == JointKind::Hinge)?;
+    let opening = if high - joint.closed >= joint.closed - low { 1.0 } else { -1.0 };
+    let volume_m3 = link.volume();
+    let middle = |(low, high): (DVec3, DVec3)| 0.5 * (low + high);
+    let solid = link.pieces.iter().filter(|piece| piece.solid);
+    let moments = solid.map(|piece| piece.shape.volume() * middle(piece.bounds(&Pose::IDENTITY)));
+    let arm = moments.sum::<DVec3>() / volume_m3.max(1e-9) - joint.origin;
+    let arm = DQuat::from_axis_angle(joint.axis, joint.closed) * arm;
+    let weight = link.mass_kg() * GRAVITY_M_S2 * DVec3::NEG_Z;
+    let moment = opening * arm.cross(weight).dot(joint.axis);
+    // Friction that barely holds it would let go at a knock.
+    (moment > HELD_SHARE * joint.friction).then_some(Latch { force: CATCH_SHARE * moment, within: CATCH_RAD })
 }
 
 /// How far a link extends from its joint's axis, metres.
@@ -108,6 +135,25 @@ mod tests {
         }
         let calm = Original { friction: 0.0, damping: 0.5 };
         assert_eq!(normalised(JointKind::Slider, DVec3::ONE, calm, 0).damping, 0.5);
+    }
+
+    #[test]
+    fn what_would_fall_open_has_a_catch() {
+        // A plate of 10 kg that stands up from its hinge and leans by 3 cm to the side on which it opens, or away from it.
+        let catch_of = |lean: f64, axis: DVec3| {
+            let shape = Shape::Solid(Solid::Box { size: DVec3::new(0.02, 0.4, 0.4) });
+            let pieces = vec![Piece::new(shape, Pose::from_translation(DVec3::new(lean, 0.0, 0.2)), [0; 3])];
+            let mut made = Joint::new(JointKind::Hinge, DVec3::ZERO, axis, Some([0.0, 1.5]));
+            let link =
+                Link { name: "a".into(), parent: 0, weight: Weight::Mass(10.0), friction: 0.5, pieces, joint: None };
+            let calm = Original { friction: 0.0, damping: 0.0 };
+            joint(&link, &mut made, &calm, &mut ChaCha8Rng::seed_from_u64(1));
+            made.latch.map(|latch| latch.force)
+        };
+        let held = catch_of(0.03, DVec3::Y).unwrap_or_default();
+        assert!((held - 1.2 * 10.0 * 9.81 * 0.03).abs() < 1e-6, "{held}");
+        assert_eq!(catch_of(-0.03, DVec3::Y), None, "it leans on what it closes");
+        assert_eq!(catch_of(0.03, DVec3::Z), None, "its weight does not turn it");
     }
 
     #[test]

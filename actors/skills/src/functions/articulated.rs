@@ -23,13 +23,18 @@ use glam::DVec3;
 /// How much wider than the part the fingers are on the way to it, metres.
 const SPREAD_M: f64 = 0.03;
 /// The least spread a part must leave, metres.
-const LEAST_SPREAD_M: f64 = 0.008;
+const LEAST_SPREAD_M: f64 = 0.006;
 /// Distance from the part at which the hand comes to rest before it goes to it, metres.
 const STANDOFF_M: f64 = 0.06;
 /// The last stretch before that, which goes straight on, metres.
 const STRAIGHT_M: f64 = 0.1;
 /// How far the hand backs off in the end, metres.
-const LEAVE_M: f64 = 0.1;
+pub(super) const LEAVE_M: f64 = 0.1;
+/// A hand that points up by more than this share stands under the part: it comes out from there by so much, metres.
+const UNDER: f64 = 0.3;
+const OUT_M: f64 = 0.25;
+/// How much farther a hinged part is led on that would fall if it were let go, radians.
+const LEAD_ON_RAD: f64 = 0.8;
 /// Speed along the way, m/s: with a part in the hand, and pressing against it.
 const PULL_M_S: f64 = 0.15;
 const PUSH_M_S: f64 = 0.08;
@@ -103,7 +108,7 @@ pub(crate) enum Felt {
 }
 
 /// Notes how far the part went, or says why that is not known.
-fn note_travel(moment: &mut Moment<'_>, object: ObjectId, felt: Felt) -> Option<Next> {
+pub(super) fn note_travel(moment: &mut Moment<'_>, object: ObjectId, felt: Felt) -> Option<Next> {
     let Some(Outcome::Followed { travelled, joint, resistance_n, stopped }) = moment.last else {
         return Some(Next::fail(FailureCause::Motion, "the motion ended without a result"));
     };
@@ -164,6 +169,20 @@ pub(crate) struct DrawKind {
     pub felt: Felt,
 }
 
+impl DrawKind {
+    /// The least travel that counts where the part stops by itself, metres or radians.
+    pub fn least(&self) -> f64 {
+        self.travel.abs() - LACK.max(LACK_SHARE * self.travel.abs())
+    }
+    /// How much farther it is led on if it would fall.
+    fn lead_on(&self) -> f64 {
+        match (self.felt, self.joint) {
+            (Felt::Open, Articulation::Revolute { .. }) => LEAD_ON_RAD,
+            _ => 0.0,
+        }
+    }
+}
+
 impl Draw {
     pub fn plan(invocation: &SkillInvocation, hand: &Hand, kind: DrawKind) -> Result<Draw, StartError> {
         let width_m = argument(invocation, "grip_width")?;
@@ -178,25 +197,25 @@ impl Draw {
         let candidates = TILTS.map(|angle| tilted(&straight, angle));
         let room = [ROOMY_M, PERCEPTION_ERROR_M];
         let grasp_at = choose(hand, kind.what, candidates, opening_m, STANDOFF_M, &around, room)?;
-        let least = kind.travel.abs() - LACK.max(LACK_SHARE * kind.travel.abs());
         Ok(Draw {
             object: invocation.part.object,
             felt: kind.felt,
             grasp_at,
             around,
             opening_m,
-            // Tips that touch in the last two thirds have met what the part stands out from.
+            // Tips that touch near the end of the way have met what the part stands out from.
             grasp: GraspPlan {
                 travel_m: STANDOFF_M,
                 width_m,
-                landed_before_m: STANDOFF_M - 1.5 * hand.tip_reach_m,
+                landed_before_m: STANDOFF_M - 2.0 * hand.tip_reach_m,
                 attached: kind.attached,
             },
             follow: FollowPlan {
                 kind: kind.primitive,
                 joint: kind.joint,
                 travel: kind.travel + kind.travel.signum() * beyond(&kind.joint, kind.to_stop),
-                least,
+                least: kind.least(),
+                lead_on: kind.lead_on(),
                 speed_m_s: PULL_M_S,
                 // Replaced by a watch of the gap that the grasp finds.
                 hold: Hold::Contact,
@@ -230,6 +249,22 @@ impl Draw {
         let plan = FollowPlan { hold: Hold::Fingers(GripWatch::new(gap_m)), ..self.follow.clone() };
         Some(Next::begin(Follow::new(moment.hand, plan)))
     }
+
+    /// Out from under the part, away from its hinge or on along its slide, so that the way up is free.
+    fn come_out(&mut self, moment: &mut Moment<'_>) -> Option<Next> {
+        let (robot, from) = (&moment.hand.robot, moment.hand.command.tcp);
+        if from.transform_vector(DVec3::Z).z < UNDER {
+            return None;
+        }
+        let out = match self.follow.joint {
+            Articulation::Prismatic { direction } => self.follow.travel.signum() * direction,
+            Articulation::Revolute { point, axis } => (from.translation - point).reject_from_normalized(axis),
+        };
+        let out = out.with_z(0.0).normalize_or_zero();
+        let at = (from.translation + OUT_M * out).max(robot.workspace_min).min(robot.workspace_max);
+        let path = Path::through(from, &[Pose::new(at, from.rotation)], Pace::free(robot), robot.tick_s);
+        Some(Next::begin(Reach::passing(path, moment.hand.command.opening_m)))
+    }
 }
 
 impl Steps for Draw {
@@ -241,6 +276,7 @@ impl Steps for Draw {
         |draw, moment| judge_stop(moment, draw.must_stop),
         |draw, moment| note_travel(moment, draw.object, draw.felt),
         |_, moment| Some(ending::back_off_by(moment.hand, LEAVE_M)),
+        Draw::come_out,
         |draw, moment| ending::felt_free(moment, draw.object),
     ];
     fn way_out(&self) -> WayOut {
@@ -317,6 +353,7 @@ impl Drive {
                 joint: kind.joint,
                 travel: kind.travel.signum() * (whole + beyond),
                 least,
+                lead_on: 0.0,
                 speed_m_s: PUSH_M_S,
                 hold: Hold::Contact,
             },

@@ -5,6 +5,7 @@ mod ending;
 mod held;
 
 pub(crate) mod close;
+pub(crate) mod drag;
 pub(crate) mod flip;
 pub(crate) mod grasp_along;
 pub(crate) mod grasp_from_above;

@@ -29,6 +29,13 @@ const BLOCKED_S: f64 = 0.8;
 /// The command may run ahead of the hand by this, metres and radians.
 const LEAD_M: f64 = 0.005;
 const LEAD_RAD: f64 = 0.1;
+/// A part that is heavy to move is pressed harder, but slowly, from this time without progress on: by so much farther a
+/// second, metres, up to this force, newtons.
+const HEAVY_S: f64 = 0.2;
+const HEAVY_M_S: f64 = 0.01;
+const HEAVY_N: f64 = 50.0;
+/// The share of the speed at which it goes then.
+const HEAVY_SHARE: f64 = 0.5;
 /// How far it comes back in a tick where the force is too great, as a share of that.
 const BACK_SHARE: f64 = 0.3;
 /// How far the hand may lag at the end, as a share of that, before it is waited for.
@@ -38,6 +45,25 @@ const SLACK_N: f64 = 8.0;
 /// How long the hand waits at the end for the motion to cease, and what counts as ceased, m/s.
 const CEASING_S: f64 = 0.16;
 const CEASED_M_S: f64 = 0.01;
+/// A part that draws the hand on with more than this at the end of its way would fall if it were let go, newtons; it is led on
+/// at this share of the speed.
+const FALLING_N: f64 = 2.0;
+const LEAD_ON_SHARE: f64 = 0.4;
+/// How the force is kept with which tips press on a face that they drag along: m/s for a newton that lacks, and at most.
+const PRESSING_M_S_N: f64 = 0.002;
+const PRESSING_M_S: f64 = 0.03;
+/// Tips that press with less than this share of it for so long have left the face; a share and seconds.
+const LEFT_SHARE: f64 = 0.2;
+const LEFT_S: f64 = 0.12;
+/// From this share on they have met it.
+const MET_SHARE: f64 = 0.8;
+/// A way leads down from this share of it on.
+const DOWN_SHARE: f64 = 0.1;
+/// Tips behind it that feel this much against the way push it, newtons.
+const PUSHED_N: f64 = 1.0;
+/// How far behind a face that they have left the tips reach to push it on, metres; and how fast they go there, m/s.
+const BEHIND_M: f64 = 0.025;
+const BEHIND_M_S: f64 = 0.1;
 /// How far the fingers open to let go, metres.
 const LET_GO_M: f64 = 0.025;
 /// How far the pushing tips back off, metres, and how fast, m/s.
@@ -64,6 +90,67 @@ pub(crate) enum Hold {
     Fingers(GripWatch),
     /// Closed finger tips press against it, and part from it at the end.
     Contact,
+    /// Closed finger tips press on a face along which the way leads, and friction takes it along.
+    Pressed(Pressing),
+}
+
+/// Tips on a face that they drag.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Pressing {
+    /// The force that is kept along the approach direction, newtons.
+    pub force_n: f64,
+    /// How far along the approach direction the command is from the way, metres.
+    deep_m: f64,
+    /// Whether the face has been felt with most of the force.
+    met: bool,
+    weak_ticks: u32,
+    /// The last force along the way while the face was felt, newtons; above 0 if the part drew the hand on.
+    drawn_n: f64,
+    /// The tips have left the face and go in behind its edge: how much farther, metres.
+    behind_m: Option<f64>,
+    /// Whether the part's weight took it from under them.
+    fell: bool,
+    /// The travel at which they last felt that they push the part from behind.
+    pushed_at: f64,
+}
+
+impl Pressing {
+    /// Keeps this force.
+    pub fn with(force_n: f64) -> Pressing {
+        Pressing { force_n, ..Pressing::default() }
+    }
+    /// One tick, with the forces into the face and along the way, and whether the way leads down; unsure while the face is not
+    /// felt.
+    fn tick(&mut self, hand: &Hand, pressed_n: f64, drawn_n: f64, falls: bool, travel: f64) -> Grip {
+        let tick_s = hand.robot.tick_s;
+        if let Some(left_m) = &mut self.behind_m {
+            let step_m = (BEHIND_M_S * tick_s).min(*left_m);
+            *left_m -= step_m;
+            self.deep_m += step_m;
+            if drawn_n < -PUSHED_N {
+                self.pushed_at = travel;
+            }
+            return Grip::Firm;
+        }
+        let speed_m_s = (PRESSING_M_S_N * (self.force_n - pressed_n)).clamp(-PRESSING_M_S, PRESSING_M_S);
+        self.deep_m += speed_m_s * tick_s;
+        if pressed_n > LEFT_SHARE * self.force_n {
+            self.met |= pressed_n > MET_SHARE * self.force_n;
+            (self.weak_ticks, self.drawn_n) = (0, drawn_n);
+            return if self.met { Grip::Firm } else { Grip::Unsure };
+        }
+        self.weak_ticks += 1;
+        if self.weak_ticks > hand.ticks(LEFT_S) {
+            self.behind_m = Some(BEHIND_M);
+            self.fell = falls && self.drawn_n > FALLING_N;
+        }
+        Grip::Unsure
+    }
+    /// Whether the part is where the tips are at the end of the way, or farther; or else where it was last felt.
+    fn lost_at(&self, goal: f64) -> Option<f64> {
+        let lost = self.behind_m.is_some() && !self.fell && self.pushed_at < (1.0 - LAST_SHARE) * goal;
+        lost.then_some(self.pushed_at)
+    }
 }
 
 /// What is to be done.
@@ -77,6 +164,8 @@ pub(crate) struct FollowPlan {
     pub travel: f64,
     /// The least of it that counts where the part stops by itself: there may be a stop before the end.
     pub least: f64,
+    /// How far beyond the end a part that would fall is led on, until it rests on something; metres or radians.
+    pub lead_on: f64,
     /// How fast the hand goes, metres per second.
     pub speed_m_s: f64,
     /// How it holds on.
@@ -121,6 +210,8 @@ pub(crate) struct Follow {
     stuck_ticks: u32,
     over_ticks: u32,
     yielded: DVec3,
+    /// How much farther the command may run ahead of a part that is heavy to move, in units of travel.
+    heavy: f64,
     touch: Touch,
     trace: Vec<DVec3>,
     resistance_n: f64,
@@ -157,12 +248,13 @@ impl Follow {
             stuck_ticks: 0,
             over_ticks: 0,
             yielded: DVec3::ZERO,
+            heavy: 0.0,
             touch: Touch::default(),
             trace: Vec::new(),
             resistance_n: 0.0,
             stopped: false,
             phase: Phase::Going,
-            limit_s: 2.5 * goal / full_speed + 8.0,
+            limit_s: 2.5 * goal / full_speed + plan.lead_on / (LEAD_ON_SHARE * full_speed) + 8.0,
             plan,
         }
     }
@@ -175,7 +267,8 @@ impl Follow {
     /// The commanded TCP: on the way, and beside it by what the hand has yielded.
     fn target(&self) -> Pose {
         let on_way = self.joint.carried(&self.from, self.sign * self.commanded);
-        Pose::new(on_way.translation + self.yielded, on_way.rotation)
+        let deep_m = if let Hold::Pressed(pressing) = &self.plan.hold { pressing.deep_m } else { 0.0 };
+        Pose::new(on_way.translation + self.yielded, on_way.rotation) * Pose::from_translation(deep_m * DVec3::Z)
     }
 
     fn go(&mut self, hand: &mut Hand, feedback: &Feedback) -> Step {
@@ -200,6 +293,10 @@ impl Follow {
                 self.touch.take(-feedback.wrist_force_n.dot(heading), steady, self.reached);
                 Grip::Firm
             }
+            Hold::Pressed(pressing) => {
+                let into = hand.command.tcp.transform_vector(DVec3::Z);
+                pressing.tick(hand, -force.dot(into), -resisting_n, heading.z < -DOWN_SHARE, self.reached)
+            }
         };
         self.yield_across(hand, force, heading);
         if self.yielded.length() > MOST_YIELDING_M {
@@ -208,26 +305,32 @@ impl Follow {
                 .failed(format!("the part led the hand {off_mm:.0} mm off the way that its joint should leave it"));
         }
         self.remember(at);
-        let lead = if self.in_place { LEAD_RAD } else { LEAD_M / self.lever };
+        let lead = if self.in_place { LEAD_RAD } else { LEAD_M / self.lever + self.heavy };
         if let Some(step) = self.check_progress(hand, at, resisting_n, lead) {
             return step;
         }
         let left = self.goal - self.commanded;
         if left <= 1e-6 {
-            return self.arrive(hand, at);
+            return self.arrive(hand, at, resisting_n);
         }
         // The newest reading, not the filtered one: a stop is met within a tick or two.
         let newest_n = (feedback.wrist_force_n - hand.baseline_n()).length();
-        if newest_n > MOST_N && !self.in_place {
+        let most_n = if self.heavy > 0.0 { HEAVY_N } else { MOST_N };
+        let laden = self.stuck_ticks > hand.ticks(HEAVY_S) && self.reached < self.plan.least;
+        if laden && newest_n < HEAVY_N && !self.in_place {
+            self.heavy = (self.heavy + HEAVY_M_S * hand.robot.tick_s / self.lever).min(LEAD_M / self.lever);
+        }
+        if newest_n > most_n && !self.in_place {
             self.commanded = self.commanded.min(self.reached.max(self.commanded - BACK_SHARE * lead));
         }
-        let held_back = newest_n > MOST_N || self.over_ticks > 0 || self.commanded - self.reached > lead;
+        let held_back = newest_n > most_n || self.over_ticks > 0 || self.commanded - self.reached > lead;
         self.speed = if held_back || grip == Grip::Unsure {
             0.5 * self.speed
         } else {
             let change = self.full_speed / RUN_UP_S;
             let braking = (2.0 * change * left).sqrt().max(0.05 * self.full_speed);
-            (self.speed + change * hand.robot.tick_s).min(self.full_speed).min(braking)
+            let fastest = if self.heavy > 0.0 { HEAVY_SHARE * self.full_speed } else { self.full_speed };
+            (self.speed + change * hand.robot.tick_s).min(fastest).min(braking)
         };
         self.commanded += (self.speed * hand.robot.tick_s).min(left);
         hand.command.tcp = limited(hand, self.target());
@@ -258,7 +361,7 @@ impl Follow {
     }
 
     /// The whole way is behind, as far as the command goes.
-    fn arrive(&mut self, hand: &Hand, at: DVec3) -> Step {
+    fn arrive(&mut self, hand: &Hand, at: DVec3, resisting_n: f64) -> Step {
         let last = (LAST_M / self.lever).min(LAST_SHARE * self.goal);
         if matches!(self.plan.hold, Hold::Contact) && !self.touch.felt_since(self.goal - last) {
             let reason = match self.touch.felt_at {
@@ -267,9 +370,17 @@ impl Follow {
             };
             return self.failed(reason);
         }
+        if let Hold::Pressed(pressing) = &self.plan.hold
+            && let Some(last) = pressing.lost_at(self.goal)
+        {
+            let last = self.words(last);
+            return self.failed(format!("the tips slipped off what they dragged along: last felt at {last}"));
+        }
         // A damped joint lags behind: it is waited for, and the check above says when that is in vain.
         let lag = if self.in_place { LEAD_RAD } else { LEAD_M / self.lever };
         if self.reached > self.goal - LATE_SHARE * lag || self.stuck_ticks > hand.ticks(0.5 * BLOCKED_S) {
+            // Fingers that yield may come to the end of the way although the part stands at its stop.
+            self.stopped |= resisting_n > MOST_N / 3.0;
             self.phase = Phase::Ceasing { ticks: 0, still_ticks: 0, last: at };
         }
         Step::Act
@@ -277,6 +388,10 @@ impl Follow {
 
     /// Moves the way aside where the part presses across it, and never along it.
     fn yield_across(&mut self, hand: &Hand, force: DVec3, heading: DVec3) {
+        if matches!(self.plan.hold, Hold::Pressed(_)) {
+            // The pressing has a rule of its own, and a face has no hold on the tips.
+            return;
+        }
         let across = force - force.dot(heading) * heading;
         let beyond_n = across.length() - YIELDING_DEAD_N;
         if beyond_n > 0.0 {
@@ -285,10 +400,10 @@ impl Follow {
         }
     }
 
-    /// Takes a place of the hand into the trace, and fits the joint to it.
+    /// Takes a place of the hand into the trace, and fits the joint to it. Tips that only touch may slip, and tell nothing.
     fn remember(&mut self, at: DVec3) {
         let far = self.trace.last().is_none_or(|last| last.distance(at) > TRACE_M);
-        if self.in_place || !far || self.trace.len() >= MAX_TRACE || matches!(self.plan.hold, Hold::Contact) {
+        if self.in_place || !far || self.trace.len() >= MAX_TRACE || !matches!(self.plan.hold, Hold::Fingers(_)) {
             return;
         }
         self.trace.push(at);
@@ -315,6 +430,16 @@ impl Follow {
         if *still_ticks < hand.ticks(CEASING_S) && *ticks < hand.ticks(4.0 * CEASING_S) {
             return Step::Act;
         }
+        let drawn_n = hand.felt_n().dot(self.heading(at));
+        let held = matches!(self.plan.hold, Hold::Fingers(_));
+        if held && !self.stopped && self.plan.lead_on > 0.0 && drawn_n > FALLING_N {
+            // It would fall if it were let go here.
+            self.goal = self.reached + std::mem::take(&mut self.plan.lead_on);
+            (self.commanded, self.best, self.stuck_ticks) = (self.reached, self.reached, 0);
+            (self.speed, self.full_speed) = (0.0, LEAD_ON_SHARE * self.full_speed);
+            self.phase = Phase::Going;
+            return Step::Act;
+        }
         if let Some(measured_from) = self.measured_from {
             let near = self.sign * self.reached;
             self.reached = self.sign * self.joint.travel(&measured_from, &feedback.tcp, near);
@@ -325,6 +450,7 @@ impl Follow {
                 self.phase = Phase::LettingGo(Release::new(feedback.opening_m, open_m));
             }
             Hold::Contact => self.phase = Phase::Parting { gone_m: 0.0 },
+            Hold::Pressed(_) => return Step::Done(self.outcome()),
         }
         Step::Act
     }

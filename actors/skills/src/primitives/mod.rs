@@ -11,7 +11,7 @@ mod release;
 mod suck;
 
 pub(crate) use carry::{Carry, Lower};
-pub(crate) use follow::{Follow, FollowPlan, Hold};
+pub(crate) use follow::{Follow, FollowPlan, Hold, Pressing};
 pub(crate) use grasp::{Grasp, GraspPlan};
 pub(crate) use grip::{Grip, GripWatch};
 pub(crate) use insert::{Insert, InsertPlan};
