@@ -32,9 +32,9 @@ const GAIN_J_KG: f64 = 0.02;
 const REMEMBERED: f64 = 0.98;
 /// Slower things than this push nothing, m/s.
 const MOVING_M_S: f64 = 0.002;
-/// A hand that comes free springs back by its wrist's deflection: its motors' greatest force over the root of stiffness
-/// times mass, m/s.
-const RELEASE_M_S: f64 = 0.6;
+/// A hand that comes free springs forward by as much as what pulls it was ahead, 15 mm: 60 N down to the deflection at which
+/// they are reached and ever less from there, on 1.5 kg, m/s.
+const RELEASE_M_S: f64 = 0.95;
 /// Fingers that meet an object at their full speed press for an instant by a quarter more than they may.
 const IMPACT: f64 = 1.25;
 
