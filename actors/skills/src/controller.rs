@@ -118,30 +118,37 @@ pub enum StartError {
 /// Starts a function kind.
 type Start = fn(&SkillInvocation, Hand, &Feedback) -> Result<Box<dyn Controller>, StartError>;
 
+/// A function kind: its name, the arguments that it cannot do without, and what starts it.
+type Kind = (&'static str, &'static [&'static str], Start);
+
 /// The function kinds, in alphabetical order.
-const KINDS: &[(&str, Start)] = &[
-    ("flip", |i, h, f| Ok(run(i, Sequence::new(flip::Flip::plan(i, &h, f)?), h))),
-    ("grasp-along", |i, h, f| Ok(run(i, Sequence::new(grasp_along::GraspAlong::plan(i, &h, f)?), h))),
+const KINDS: &[Kind] = &[
+    ("flip", &["grip_width", "height"], |i, h, f| Ok(run(i, Sequence::new(flip::Flip::plan(i, &h, f)?), h))),
+    ("grasp-along", &["grip_width", "height"], |i, h, f| {
+        Ok(run(i, Sequence::new(grasp_along::GraspAlong::plan(i, &h, f)?), h))
+    }),
     // What a hand does to take a part from above depends on the hand.
-    ("grasp-from-above", |i, h, f| match h.robot.suction.is_some() {
+    ("grasp-from-above", &["grip_width", "height"], |i, h, f| match h.robot.suction.is_some() {
         true => Ok(run(i, suck_from_above::SuckFromAbove::plan(i, &h, f)?, h)),
         false => Ok(run(i, grasp_from_above::GraspFromAbove::plan(i, &h, f)?, h)),
     }),
-    ("hinge-close", |i, h, _| close_it(i, h, HINGED)),
-    ("hinge-open", |i, h, _| open_it(i, h, HINGED)),
-    ("insert-along", |i, h, f| Ok(run(i, Sequence::new(insert_along::InsertAlong::plan(i, &h, f)?), h))),
-    ("move-to", |i, h, _| Ok(run(i, Sequence::new(move_to::plan(i, &h)?), h))),
-    ("place-upright", |i, h, f| Ok(run(i, place_upright::PlaceUpright::plan(i, &h, f)?, h))),
-    ("press", |i, h, f| Ok(run(i, Sequence::new(press::Press::plan(i, &h, f)?), h))),
-    ("press-down", |i, h, f| Ok(run(i, press_down::PressDown::plan(i, &h, f)?, h))),
-    ("pull-along", |i, h, _| Ok(run(i, Sequence::new(pull_along::plan(i, &h)?), h))),
-    ("push-along", |i, h, _| Ok(run(i, Sequence::new(push_along::plan(i, &h)?), h))),
-    ("reach", |i, h, _| Ok(run(i, Sequence::new(reach::Reach::plan(i, &h)?), h))),
-    ("release", |i, h, _| Ok(run(i, Sequence::new(release::Release::plan(i)?), h))),
-    ("rotate", |i, h, _| Ok(run(i, Sequence::new(rotate::plan(i, &h)?), h))),
-    ("slide-close", |i, h, _| close_it(i, h, SLIDING)),
-    ("slide-open", |i, h, _| open_it(i, h, SLIDING)),
-    ("turn", |i, h, _| Ok(run(i, Sequence::new(turn::plan(i, &h)?), h))),
+    ("hinge-close", &[HINGED.travel], |i, h, _| close_it(i, h, HINGED)),
+    ("hinge-open", &[HINGED.travel], |i, h, _| open_it(i, h, HINGED)),
+    ("insert-along", &["depth", "clearance"], |i, h, f| {
+        Ok(run(i, Sequence::new(insert_along::InsertAlong::plan(i, &h, f)?), h))
+    }),
+    ("move-to", &[], |i, h, _| Ok(run(i, Sequence::new(move_to::plan(i, &h)?), h))),
+    ("place-upright", &["height"], |i, h, f| Ok(run(i, place_upright::PlaceUpright::plan(i, &h, f)?, h))),
+    ("press", &["stroke", "force"], |i, h, f| Ok(run(i, Sequence::new(press::Press::plan(i, &h, f)?), h))),
+    ("press-down", &["stroke", "force"], |i, h, f| Ok(run(i, press_down::PressDown::plan(i, &h, f)?, h))),
+    ("pull-along", &["grip_width", "travel"], |i, h, _| Ok(run(i, Sequence::new(pull_along::plan(i, &h)?), h))),
+    ("push-along", &["travel"], |i, h, _| Ok(run(i, Sequence::new(push_along::plan(i, &h)?), h))),
+    ("reach", &["distance"], |i, h, _| Ok(run(i, Sequence::new(reach::Reach::plan(i, &h)?), h))),
+    ("release", &[], |i, h, _| Ok(run(i, Sequence::new(release::Release::plan(i)?), h))),
+    ("rotate", &["angle"], |i, h, _| Ok(run(i, Sequence::new(rotate::plan(i, &h)?), h))),
+    ("slide-close", &[SLIDING.travel], |i, h, _| close_it(i, h, SLIDING)),
+    ("slide-open", &[SLIDING.travel], |i, h, _| open_it(i, h, SLIDING)),
+    ("turn", &["grip_width", "angle"], |i, h, _| Ok(run(i, Sequence::new(turn::plan(i, &h)?), h))),
 ];
 
 /// By its handle where there is one to take, else by its edge.
@@ -166,7 +173,12 @@ fn run(invocation: &SkillInvocation, function: impl Function + 'static, hand: Ha
 
 /// The function kinds that this build can run, in alphabetical order.
 pub fn kinds() -> Vec<&'static str> {
-    KINDS.iter().map(|(kind, _)| *kind).collect()
+    KINDS.iter().map(|(kind, ..)| *kind).collect()
+}
+
+/// The arguments that a function kind cannot do without; `None` if there is no such kind.
+pub fn required_arguments(kind: &str) -> Option<&'static [&'static str]> {
+    KINDS.iter().find(|(name, ..)| *name == kind).map(|(_, required, _)| *required)
 }
 
 /// Starts the controller of `invocation.kind`. The feedback must be the present one: the motion begins where the
@@ -176,9 +188,12 @@ pub fn start(
     robot: &RobotDescription,
     feedback: &Feedback,
 ) -> Result<Box<dyn Controller>, StartError> {
-    let Some((_, start)) = KINDS.iter().find(|(kind, _)| *kind == invocation.kind) else {
+    let Some((_, required, start)) = KINDS.iter().find(|(kind, ..)| *kind == invocation.kind) else {
         return Err(StartError::UnknownKind { kind: invocation.kind.clone(), known: kinds().join(", ") });
     };
+    for name in *required {
+        argument(invocation, name)?;
+    }
     let arm = choose(invocation, robot, feedback);
     let hand = Hand::for_skill(invocation, robot, feedback, arm);
     start(invocation, hand, feedback.of_arm(arm).unwrap_or(feedback))

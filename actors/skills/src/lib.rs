@@ -48,5 +48,5 @@ pub mod retreat;
 mod run;
 mod sequence;
 
-pub use controller::{Controller, StartError, Tick, kinds, start};
+pub use controller::{Controller, StartError, Tick, kinds, required_arguments, start};
 pub use retreat::{Retreat, RetreatTick, retreat};

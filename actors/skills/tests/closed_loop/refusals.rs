@@ -2,7 +2,7 @@
 
 use super::*;
 use acm_concept::{embodiment::Feedback, skill::FailureCause};
-use acm_skills::{StartError, kinds};
+use acm_skills::{StartError, kinds, required_arguments};
 use proptest::prelude::*;
 
 const CUBE: DVec3 = DVec3::splat(0.04);
@@ -32,6 +32,24 @@ fn refusals_name_what_is_wrong() {
     assert!(matches!(refusal(&homeless, &idle), StartError::NothingHeld { .. }));
     let from_below = place(Pose::from_translation(DVec3::Z * 0.02), at);
     assert!(matches!(refusal(&from_below, &idle), StartError::Tilted { .. }));
+}
+
+#[test]
+fn each_kind_asks_for_exactly_what_it_says_it_requires() {
+    let idle = World::new().feedback();
+    for kind in kinds() {
+        let required = required_arguments(kind).unwrap();
+        let mut whole = invocation(kind, table_pose(0.1, -0.1, 0.0), 0.03, &[]);
+        whole.arguments.extend(required.iter().map(|name| (name.to_string(), 0.02)));
+        let started = start(&whole, &world::robot(), &idle).map(|_| ());
+        assert!(!matches!(started, Err(StartError::Argument { .. })), "{kind}: {started:?}");
+        for name in required {
+            let mut lacking = whole.clone();
+            lacking.arguments.remove(*name);
+            let refused = refusal(&lacking, &idle);
+            assert!(matches!(refused, StartError::Argument { argument, .. } if argument == *name), "{kind}: {refused}");
+        }
+    }
 }
 
 #[test]
