@@ -353,9 +353,7 @@ mod tests {
     fn a_hand_that_jumps_or_crushes_is_caught() {
         let world = world();
         let mut audit = Audit::default();
-        let hand = |x: f64, grip_n: f64| {
-            [Hand { at: DVec3::X * x, grip_n, max_speed_m_s: 0.5, max_grip_n: 40.0 }]
-        };
+        let hand = |x: f64, grip_n: f64| [Hand { at: DVec3::X * x, grip_n, max_speed_m_s: 0.5, max_grip_n: 40.0 }];
         for (x, grip_n, violations) in [(0.0, 0.0, 0), (0.002, 45.0, 0), (0.02, 0.0, 1), (0.02, 55.0, 2)] {
             audit.step(&world.physics, &[], &hand(x, grip_n), x);
             assert_eq!(audit.report().violations, violations, "{:?}", audit.report());

@@ -74,7 +74,9 @@ impl Fingers {
 
     /// What the drive pressed the fingers together with in the last physics step, newtons; below 0 while it opens them.
     pub(crate) fn grip_n(&self, world: &PhysicsWorld) -> f64 {
-        let motor = |joint| world.impulse_joints.get(joint).map_or(0.0, |joint| joint.data.motors[JointAxis::LinX as usize].impulse);
+        let motor = |joint| {
+            world.impulse_joints.get(joint).map_or(0.0, |joint| joint.data.motors[JointAxis::LinX as usize].impulse)
+        };
         let impulse = self.joints.iter().map(|joint| f64::from(motor(*joint))).sum::<f64>();
         // The engine keeps the impulse of the last substep alone.
         0.5 * impulse * SUBSTEPS as f64 / f64::from(world.integration_parameters.dt)
