@@ -190,6 +190,30 @@ pub struct RunArgs {
     pub json: bool,
 }
 
+impl RunArgs {
+    /// The words that start this run again, but for its seed, its memory and what it leaves: runs that may be compared
+    /// seed by seed have the same.
+    pub fn words(&self) -> Vec<String> {
+        let mut words: Vec<String> = self.scenario.iter().cloned().collect();
+        let mut option = |name: &str, value: Option<String>| {
+            words.extend(value.into_iter().flat_map(|value| [format!("--{name}"), value]));
+        };
+        let path = |path: &PathBuf| path.display().to_string();
+        option("robot", self.robot.as_ref().map(ToString::to_string));
+        option("until", self.until.map(|until| until.to_string()));
+        option("method", Some(self.method.clone()));
+        let on_unknown = self.on_unknown.to_possible_value();
+        option("on-unknown", on_unknown.map(|value| value.get_name().to_owned()));
+        option("instruction", self.instruction.clone());
+        option("library", self.library.as_ref().map(path));
+        self.inject.iter().for_each(|fault| option("inject", Some(fault.to_string())));
+        option("sensor", self.sensor.clone());
+        self.set.iter().for_each(|setting| option("set", Some(setting.to_string())));
+        words.extend(self.no_motion.then(|| "--no-motion".to_owned()));
+        words
+    }
+}
+
 /// Arguments of `acm demo`.
 #[derive(Debug, Args)]
 pub struct DemoArgs {
@@ -330,6 +354,65 @@ pub enum TraceCommand {
     Ls(TraceLsArgs),
     /// The messages of a run as a table; or one step's decision; or one message in full.
     Show(TraceShowArgs),
+    /// Where two runs part: the first record that differs, its fields, and memory there. Exit 0 equal, 1 different, 2
+    /// unusable.
+    Diff(TraceDiffArgs),
+    /// Hold a run against rules, for tests. Exit 0 kept, 1 broken, 2 unusable.
+    Check(TraceCheckArgs),
+    /// Run a recorded run again and compare it message by message. Exit 0 identical, 1 diverged, 2 unusable.
+    Replay(TraceReplayArgs),
+    /// Make a whole file of what is left of a cut one.
+    Repair(TraceRepairArgs),
+}
+
+/// Arguments of `acm trace diff`.
+#[derive(Debug, Args)]
+pub struct TraceDiffArgs {
+    /// A trace.
+    pub a: PathBuf,
+    /// Another one.
+    pub b: PathBuf,
+    /// Print JSON instead of text: null if they are equal.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `acm trace check`.
+#[derive(Debug, Args)]
+pub struct TraceCheckArgs {
+    /// The trace.
+    pub file: PathBuf,
+    /// The rules, a TOML file (docs/trace.md).
+    pub rules: PathBuf,
+    /// Print JSON instead of text.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `acm trace replay`.
+#[derive(Debug, Args)]
+pub struct TraceReplayArgs {
+    /// The trace.
+    pub file: PathBuf,
+    /// Run physics and renderer again too, instead of taking what they gave from the trace.
+    #[arg(long)]
+    pub resim: bool,
+    /// Stop after the message of this number.
+    #[arg(long, value_name = "N")]
+    pub until: Option<u64>,
+    /// Print each message, and wait for Enter before it is handled; `q` ends.
+    #[arg(long)]
+    pub step: bool,
+}
+
+/// Arguments of `acm trace repair`.
+#[derive(Debug, Args)]
+pub struct TraceRepairArgs {
+    /// The cut trace. It is left as it is.
+    pub file: PathBuf,
+    /// The whole file; FILE-repaired.mcap beside it if absent.
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
 }
 
 /// Arguments of `acm trace ls`.

@@ -59,6 +59,8 @@ pub struct EpisodeConfig {
     pub panic_at: Option<(String, u64)>,
     /// The event at which the run ends.
     pub until: Option<Until>,
+    /// The words that start such a run from the command line; empty where it was not started there. For the trace.
+    pub arguments: Vec<String>,
 }
 
 /// What an episode came to, from both sides.
@@ -283,7 +285,7 @@ impl Runner {
     }
 
     /// Lets an agent live in a world.
-    fn live(
+    pub(crate) fn live(
         &self,
         mut task: TaskSpec,
         outside: Outside,
@@ -356,7 +358,7 @@ impl World<'_> {
 }
 
 /// An episode before it is judged.
-struct Lived {
+pub(crate) struct Lived {
     report: EpisodeReport,
     spent_s: BTreeMap<String, f64>,
     commands: u64,

@@ -3,6 +3,7 @@
 use acm_actors::episode::WipeAt;
 use acm_concept::camera::{CameraError, CameraModel, CameraSource, RgbdFrame};
 use std::{
+    fmt,
     str::FromStr,
     sync::{Arc, Mutex, PoisonError},
 };
@@ -27,6 +28,20 @@ pub enum Injection {
         /// Which message.
         message: u64,
     },
+}
+
+impl fmt::Display for Injection {
+    /// As `--inject` takes it.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Injection::BlackFrames => write!(f, "black-frames"),
+            Injection::FreezeFrames => write!(f, "freeze-frames"),
+            Injection::WipeMemory(event) => write!(f, "wipe-memory@{event}"),
+            Injection::Slip(carry) => write!(f, "slip@{carry}"),
+            Injection::Drop(carry) => write!(f, "drop@{carry}"),
+            Injection::Panic { role, message } => write!(f, "panic@{role}:{message}"),
+        }
+    }
 }
 
 impl FromStr for Injection {
@@ -181,6 +196,9 @@ mod tests {
         assert_eq!(["slip@2", "drop@1"].map(str::parse), [Ok(Injection::Slip(2)), Ok(Injection::Drop(1))]);
         assert_eq!("wipe-memory@instruction".parse(), Ok(Injection::WipeMemory(WipeAt::Instruction)));
         assert_eq!("panic@memory:4".parse(), Ok(Injection::Panic { role: "memory".into(), message: 4 }));
+        for word in ["black-frames", "freeze-frames", "wipe-memory@first-verified-place", "slip@2", "panic@memory:4"] {
+            assert_eq!(word.parse::<Injection>().map(|fault| fault.to_string()), Ok(word.into()));
+        }
         for bad in
             ["panic@memory", "panic@butler:1", "panic@memory:0", "slip@0", "slip", "wipe-memory@noon", "white-frames"]
         {

@@ -47,6 +47,7 @@ pub(crate) fn prepare(args: &RunArgs) -> anyhow::Result<(EpisodeConfig, Template
         no_motion: args.no_motion,
         sensor: args.sensor.clone(),
         until: args.until,
+        arguments: args.words(),
         ..EpisodeConfig::default()
     };
     let library = match &args.library {

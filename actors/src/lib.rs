@@ -18,6 +18,7 @@
 //! | [`agent`] | the builder that puts an agent together, and one episode's run |
 //! | [`message`] | every message between the actors |
 //! | [`trace`] | all of a run in one file |
+//! | [`replay`] | the world of a recorded run |
 //! | [`report`] | what an episode came to |
 //! | [`episode`] | the closed loop (the paper's Algorithm 1) |
 //! | [`perception`], [`memory`], [`planner`], [`executor`], [`verifier`] | the five actors |
@@ -33,6 +34,7 @@ pub mod message;
 pub mod perception;
 pub mod planner;
 pub mod remote;
+pub mod replay;
 pub mod report;
 pub mod trace;
 pub mod verifier;

@@ -15,6 +15,13 @@ pub const RUN: &str = "acm.run";
 /// Name of the metadata record about its result.
 pub const RESULT: &str = "acm.result";
 
+/// How the names of attachments with the memory that a run began with begin.
+pub const MEMORY_FOLDER: &str = "memory/";
+/// An attachment in place of a memory that is too large to be kept.
+pub const MEMORY_LEFT_OUT: &str = "memory-left-out";
+/// Most bytes of such a memory.
+const MAX_MEMORY_BYTES: u64 = 48 << 20;
+
 /// Where a run's trace goes and what it keeps of frames.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TraceRequest {
@@ -98,6 +105,9 @@ impl Recording {
         let about: BTreeMap<String, String> = about.map(|(name, value)| (name.into(), value.into())).into();
         writer.metadata(RUN, about)?;
         writer.attach("options.json", "application/json", &options)?;
+        if let Some(folder) = &config.memory {
+            attach_memory(&writer, folder)?;
+        }
         writer.flush()?;
         Ok(Recording { trace: Arc::new(Trace::new(writer, request.frames)?) })
     }
@@ -127,10 +137,30 @@ impl Recording {
     }
 }
 
+/// Keeps the memory that a run goes on with, so that it can be run again.
+fn attach_memory(writer: &TraceWriter, folder: &Path) -> anyhow::Result<()> {
+    // A memory that is not there yet is made by the run.
+    let Ok(entries) = std::fs::read_dir(folder) else { return Ok(()) };
+    let mut files: Vec<PathBuf> = entries.filter_map(|entry| entry.ok().map(|entry| entry.path())).collect();
+    files.retain(|path| path.is_file());
+    files.sort();
+    let size = |path: &PathBuf| std::fs::metadata(path).map_or(0, |about| about.len());
+    if files.iter().map(size).sum::<u64>() > MAX_MEMORY_BYTES {
+        return Ok(writer.attach(MEMORY_LEFT_OUT, "text/plain", b"")?);
+    }
+    for path in files {
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let data = std::fs::read(&path).with_context(|| format!("{} cannot be read", path.display()))?;
+        writer.attach(&format!("{MEMORY_FOLDER}{name}"), "application/octet-stream", &data)?;
+    }
+    Ok(())
+}
+
 /// What the run was told, but for its seed: equal for runs that may be compared seed by seed.
 fn options(world: &str, config: &EpisodeConfig) -> serde_json::Value {
     serde_json::json!({
         "scenario": world,
+        "arguments": config.arguments,
         "method": config.method,
         "on_unknown": config.on_unknown,
         "instruction": config.instruction,

@@ -146,6 +146,7 @@ const KINDS: &[Kind] = &[
     ("reach", &["distance"], |i, h, _| Ok(run(i, Sequence::new(reach::Reach::plan(i, &h)?), h))),
     ("release", &[], |i, h, _| Ok(run(i, Sequence::new(release::Release::plan(i)?), h))),
     ("rotate", &["angle"], |i, h, _| Ok(run(i, Sequence::new(rotate::plan(i, &h)?), h))),
+    ("slice", &["force"], |i, h, _| Ok(run(i, Sequence::new(slice::Slice::plan(i, &h)?), h))),
     ("slide-close", &[SLIDING.travel], |i, h, _| close_it(i, h, SLIDING)),
     ("slide-open", &[SLIDING.travel], |i, h, _| open_it(i, h, SLIDING)),
     ("turn", &["grip_width", "angle"], |i, h, _| Ok(run(i, Sequence::new(turn::plan(i, &h)?), h))),

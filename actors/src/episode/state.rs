@@ -7,7 +7,7 @@ use acm_concept::{
 };
 use acm_memory::observation::{Executed, Outcome};
 use serde::Serialize;
-use std::{collections::BTreeMap, str::FromStr};
+use std::{collections::BTreeMap, fmt, str::FromStr};
 use thiserror::Error;
 
 /// What the loop waits for.
@@ -67,6 +67,14 @@ pub enum Until {
     Instruction,
 }
 
+impl fmt::Display for Until {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Until::Instruction => f.write_str("instruction"),
+        }
+    }
+}
+
 impl FromStr for Until {
     type Err = String;
     fn from_str(text: &str) -> Result<Self, String> {
@@ -81,6 +89,15 @@ impl FromStr for Until {
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("`{0}` is no event: write `instruction` or `first-verified-SKILL`, such as `first-verified-place`")]
 pub struct ParseEventError(String);
+
+impl fmt::Display for WipeAt {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            WipeAt::Instruction => f.write_str("instruction"),
+            WipeAt::FirstVerified(skill) => write!(f, "first-verified-{skill}"),
+        }
+    }
+}
 
 impl FromStr for WipeAt {
     type Err = ParseEventError;

@@ -1,7 +1,7 @@
 //! Changes to a scenario from the command line: `robot.model=panda`.
 
 use super::ScenarioError;
-use std::str::FromStr;
+use std::{fmt, str::FromStr};
 use toml::{Table, Value};
 
 /// Most names in a path.
@@ -20,6 +20,13 @@ const MAX_DEPTH: usize = 8;
 pub struct Setting {
     path: Vec<String>,
     value: Value,
+}
+
+impl fmt::Display for Setting {
+    /// `PATH=VALUE`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}={}", self.path.join("."), self.value)
+    }
 }
 
 impl FromStr for Setting {

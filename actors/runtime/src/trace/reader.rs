@@ -1,6 +1,6 @@
 //! Reads a trace from its beginning as far as it goes.
 
-use super::writer::{MAX_CHANNELS, MAX_RECORD_BYTES, PROFILE};
+use super::writer::{MAX_CHANNELS, MAX_RECORD_BYTES, PROFILE, Schema};
 use mcap::{
     McapError,
     records::Record as McapRecord,
@@ -56,8 +56,19 @@ pub struct ChannelInfo {
     pub topic: String,
     /// Name of the message type.
     pub schema: String,
+    /// Language of the type's description: `jsonschema` or `protobuf`.
+    pub language: String,
+    /// The type's description.
+    pub description: Arc<[u8]>,
     /// Encoding of the messages: `json` or `protobuf`.
     pub encoding: String,
+}
+
+impl ChannelInfo {
+    /// How its messages are described, as a writer takes it.
+    pub fn schema(&self) -> Schema<'_> {
+        Schema { name: &self.schema, encoding: &self.language, data: &self.description, messages: &self.encoding }
+    }
 }
 
 /// A message of a trace.
@@ -65,6 +76,8 @@ pub struct ChannelInfo {
 pub struct TraceMessage {
     /// Where it was written.
     pub channel: Arc<ChannelInfo>,
+    /// The number that its writer gave it, cut to 32 bits.
+    pub sequence: u32,
     /// Virtual time, nanoseconds.
     pub time_ns: u64,
     /// The bytes.
@@ -105,7 +118,7 @@ pub enum Item {
 pub struct TraceReader {
     source: BufReader<File>,
     linear: LinearReader,
-    schemas: BTreeMap<u16, String>,
+    schemas: BTreeMap<u16, (String, String, Arc<[u8]>)>,
     channels: BTreeMap<u16, Arc<ChannelInfo>>,
     bytes: u64,
     messages: u64,
@@ -116,6 +129,16 @@ pub struct TraceReader {
 impl TraceReader {
     /// Opens a file and reads its header.
     pub fn open(path: &Path) -> Result<TraceReader, TraceReadError> {
+        TraceReader::open_as(path, true)
+    }
+
+    /// As [`TraceReader::open`], but gives what stands in the part that is left of a cut chunk as well. Nothing vouches
+    /// for those messages: the checksum stands at the end of the chunk.
+    pub fn open_unchecked(path: &Path) -> Result<TraceReader, TraceReadError> {
+        TraceReader::open_as(path, false)
+    }
+
+    fn open_as(path: &Path, checked: bool) -> Result<TraceReader, TraceReadError> {
         let failed = |e: std::io::Error| TraceReadError::Open { path: path.into(), reason: e.to_string() };
         let foreign = |reason: String| TraceReadError::Foreign { path: path.into(), reason };
         let file = File::open(path).map_err(failed)?;
@@ -127,7 +150,7 @@ impl TraceReader {
             return Err(TraceReadError::TooLarge { path: path.into(), bytes: about.len() });
         }
         let options = LinearReaderOptions::default()
-            .with_validate_chunk_crcs(true)
+            .with_validate_chunk_crcs(checked)
             .with_record_length_limit(2 * MAX_RECORD_BYTES);
         let mut reader = TraceReader {
             source: BufReader::new(file),
@@ -186,12 +209,13 @@ impl TraceReader {
     /// Takes over what describes other records, and gives what a caller wants to see.
     fn take(&mut self, record: McapRecord<'static>) -> Result<Option<Item>, String> {
         match record {
-            McapRecord::Schema { header, .. } => {
-                self.schemas.insert(header.id, header.name);
+            McapRecord::Schema { header, data } => {
+                self.schemas.insert(header.id, (header.name, header.encoding, data.as_ref().into()));
             }
             McapRecord::Channel(channel) => {
-                let schema = self.schemas.get(&channel.schema_id).cloned().unwrap_or_default();
-                let info = ChannelInfo { topic: channel.topic, schema, encoding: channel.message_encoding };
+                let (schema, language, description) = self.schemas.get(&channel.schema_id).cloned().unwrap_or_default();
+                let (topic, encoding) = (channel.topic, channel.message_encoding);
+                let info = ChannelInfo { topic, schema, language, description, encoding };
                 self.channels.insert(channel.id, Arc::new(info));
                 if self.channels.len() > MAX_CHANNELS {
                     return Err(format!("it has more than {MAX_CHANNELS} channels"));
@@ -205,7 +229,8 @@ impl TraceReader {
                 let channel = self.channels.get(&header.channel_id).cloned();
                 let channel = channel
                     .ok_or_else(|| format!("a message is on channel {}, which it has not", header.channel_id))?;
-                let message = TraceMessage { channel, time_ns: header.log_time, data: data.into_owned() };
+                let (sequence, time_ns) = (header.sequence, header.log_time);
+                let message = TraceMessage { channel, sequence, time_ns, data: data.into_owned() };
                 return Ok(Some(Item::Message(message)));
             }
             McapRecord::Metadata(metadata) => {

@@ -20,6 +20,7 @@ pub(crate) mod push_along;
 pub(crate) mod reach;
 pub(crate) mod release;
 pub(crate) mod rotate;
+pub(crate) mod slice;
 pub(crate) mod suck_from_above;
 pub(crate) mod turn;
 

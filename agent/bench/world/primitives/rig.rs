@@ -188,3 +188,74 @@ pub fn part(pose: Pose) -> GroundedPart {
         appearance: Appearance { mean: Lab { l: 50.0, a: 0.0, b: 0.0 }, spread: 2.0 },
     }
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+    use super::*;
+
+    const LOAF_M: f64 = 0.05;
+
+    /// A blade that stands on its edge, a loaf, and a rule that slices the loaf when the blade's edge comes onto it.
+    fn kitchen() -> String {
+        let models = r##"
+[[model]]
+model = "blade"
+summary = ""
+density_kg_m3 = 1000
+[[model.solid]]
+shape = "box"
+size = [0.12, 0.012, 0.06]
+color = "#a0a0a0"
+[[model]]
+model = "loaf"
+summary = ""
+density_kg_m3 = 700
+[[model.solid]]
+shape = "box"
+size = [0.1, 0.07, 0.05]
+color = "#a06020"
+"##;
+        let objects = format!(
+            r#"
+[[object]]
+name = "blade"
+model = "blade"
+position = [0.0, -0.15, {TABLE_M}]
+[[object]]
+name = "loaf"
+model = "loaf"
+position = [0.1, 0.15, {TABLE_M}]
+[[fluent]]
+name = "sliced"
+[[rule]]
+name = "an edge on the loaf slices it"
+when = "abs(blade_x - loaf_x) < 0.05 && abs(blade_y - loaf_y) < 0.03 && blade_z < loaf_z + {} && blade_pads > 1"
+set = {{ sliced = 1 }}
+"#,
+            LOAF_M + 0.001
+        );
+        scenario(models, &objects, 0.6).replace("time > 1000000", "sliced > 0")
+    }
+
+    #[test]
+    fn a_loaf_is_sliced_once_the_edge_is_pressed_onto_it() {
+        let mut rig = Rig::new(&kitchen(), 0).unwrap();
+        let (blade, loaf) = (rig.object("blade").unwrap().pose, rig.object("loaf").unwrap().pose);
+        let grip = blade * Pose::from_yaw(DVec3::Z * 0.06, 0.0);
+        let pick = invocation("grasp-from-above", ObjectId(1), blade, grip, &[("grip_width", 0.012), ("height", 0.06)]);
+        let (object, base_in_tcp) = rig.done(&pick).unwrap().held.unwrap();
+        let top = loaf * Pose::from_yaw(DVec3::Z * LOAF_M, 0.0);
+        let mut slice = invocation("slice", ObjectId(2), loaf, top, &[("force", 8.0)]);
+        slice.held = Some((object, base_in_tcp, part(blade)));
+        assert!(!rig.simulation.verdict().strict);
+        let report = rig.done(&slice).unwrap();
+        assert!(report.measured["slice_force_n"] >= 8.0 && report.held.is_some(), "{report:?}");
+        assert!(rig.simulation.verdict().strict, "{:?}", rig.simulation.verdict());
+        assert_eq!(rig.simulation.audit().violations, 0);
+        // Over the bare table there is nothing to slice, and it is said.
+        slice.frame = Pose::from_yaw(DVec3::new(-0.2, 0.15, TABLE_M + LOAF_M), 0.0);
+        slice.held = report.held.map(|(object, base)| (object, base, part(blade)));
+        assert!(rig.done(&slice).unwrap_err().contains("touched nothing"));
+    }
+}

@@ -1,0 +1,179 @@
+//! A trace read for being run again.
+
+use super::{
+    recording::MEMORY_FOLDER,
+    replay::run_arguments,
+    run_file::{Entry, Header, RunFile},
+};
+use crate::cli::RunArgs;
+use acm_actors::{
+    host::Outside,
+    message::HOST,
+    replay::{Answer, outside},
+    trace::viewer,
+};
+use acm_concept::{embodiment::RobotDescription, task::TaskSpec, time::Time};
+use acm_runtime::trace::{Item, TraceReader, reader::TraceMessage};
+use anyhow::{Context, bail};
+use serde::{Deserialize, de::DeserializeOwned};
+use std::{collections::BTreeMap, path::Path};
+
+/// Most bytes of frames that are held.
+const MAX_PIXEL_BYTES: usize = 8 << 30;
+
+/// All that a replay needs of a trace.
+#[derive(Debug, Clone, Default)]
+pub struct Recorded {
+    about: BTreeMap<String, String>,
+    /// The messages in order.
+    pub entries: Vec<Entry>,
+    /// Why the trace ends too early, if it does.
+    pub cut: Option<String>,
+    attached: BTreeMap<String, Vec<u8>>,
+    /// Colour and depth by camera and number of the message that asked for them.
+    pixels: BTreeMap<(String, u64), [Option<Vec<u8>>; 2]>,
+}
+
+#[derive(Deserialize)]
+struct Options {
+    #[serde(default)]
+    arguments: Vec<String>,
+    #[serde(default)]
+    keeps_memory: bool,
+}
+
+impl Recorded {
+    /// Reads a trace as far as it goes.
+    ///
+    /// # Errors
+    /// The file is no trace, or too large.
+    pub fn read(path: &Path) -> anyhow::Result<Recorded> {
+        let run = RunFile::read(path)?;
+        let mut recorded = Recorded { about: run.about, entries: run.entries, cut: run.cut, ..Recorded::default() };
+        let (mut reader, mut held) = (TraceReader::open(path)?, 0);
+        while let Some(item) = reader.next_item() {
+            match item {
+                Item::Attachment { name, data, .. } => {
+                    recorded.attached.insert(name, data);
+                }
+                Item::Message(message) => {
+                    held += recorded.keep(&message);
+                    if held > MAX_PIXEL_BYTES {
+                        bail!("{} has more than {MAX_PIXEL_BYTES} bytes of frames", path.display());
+                    }
+                }
+                Item::Metadata { .. } => {}
+            }
+        }
+        if recorded.entries.is_empty() {
+            bail!("{} holds no message: there is nothing to replay", path.display());
+        }
+        Ok(recorded)
+    }
+
+    /// Keeps the pixels of a frame; tells how many bytes they are.
+    fn keep(&mut self, message: &TraceMessage) -> usize {
+        let topic = message.topic().strip_prefix("/camera/").and_then(|rest| rest.rsplit_once('/'));
+        let place = match topic {
+            Some((_, "color")) => 0,
+            Some((_, "depth")) => 1,
+            _ => return 0,
+        };
+        let (Some((camera, _)), Some(bytes)) = (topic, viewer::read_image(&message.data)) else { return 0 };
+        let length = bytes.len();
+        let frame = self.pixels.entry((camera.into(), u64::from(message.sequence))).or_default();
+        if let Some(slot) = frame.get_mut(place) {
+            *slot = Some(bytes);
+        }
+        length
+    }
+
+    /// A value of what is known of the run; `?` where it is not.
+    pub fn about(&self, name: &str) -> &str {
+        self.about.get(name).map_or("?", String::as_str)
+    }
+
+    /// The run's seed.
+    ///
+    /// # Errors
+    /// The trace does not say it.
+    pub fn seed(&self) -> anyhow::Result<u64> {
+        self.about("seed").parse().context("the trace does not say the run's seed")
+    }
+
+    /// What the agent was told.
+    ///
+    /// # Errors
+    /// It is missing or malformed.
+    pub fn task(&self) -> anyhow::Result<TaskSpec> {
+        self.file("task.json")
+    }
+
+    /// What the run was told on the command line.
+    ///
+    /// # Errors
+    /// The run was not started there.
+    pub fn arguments(&self) -> anyhow::Result<RunArgs> {
+        let options: Options = self.file("options.json")?;
+        if options.arguments.is_empty() {
+            bail!("the trace does not say how its run was started: it was not started by `acm run`");
+        }
+        run_arguments(&options.arguments)
+    }
+
+    /// A folder with the memory that the run began with; `None` where it began with an empty one.
+    ///
+    /// # Errors
+    /// The memory was too large for the trace, or the folder cannot be written.
+    pub fn memory(&self) -> anyhow::Result<Option<tempfile::TempDir>> {
+        let options: Options = self.file("options.json")?;
+        if !options.keeps_memory {
+            return Ok(None);
+        }
+        let folder = tempfile::tempdir()?;
+        if self.attached.contains_key(super::recording::MEMORY_LEFT_OUT) {
+            bail!("the memory that the run began with was too large for its trace: the run cannot be repeated");
+        }
+        let files = self.attached.iter().filter_map(|(name, data)| Some((name.strip_prefix(MEMORY_FOLDER)?, data)));
+        for (name, data) in files {
+            // Of a name from a file only the last part is trusted.
+            let name = Path::new(name).file_name().context("a file of the memory has no name")?;
+            std::fs::write(folder.path().join(name), data)?;
+        }
+        Ok(Some(folder))
+    }
+
+    /// The world that answers as it did.
+    ///
+    /// # Errors
+    /// The trace does not keep what it answered.
+    pub fn outside(&self) -> anyhow::Result<Outside> {
+        let robot: RobotDescription = self.file("robot.json")?;
+        let began = self.entries.first().map_or(0, |entry| entry.header.t);
+        let mut answers = Vec::new();
+        for entry in self.entries.iter().filter(|entry| is_answer(&entry.header)) {
+            answers.push(self.answer(entry)?);
+        }
+        Ok(outside(robot, self.task()?.cameras, Time(began), answers))
+    }
+
+    fn answer(&self, entry: &Entry) -> anyhow::Result<Answer> {
+        let asked = entry.header.cause.unwrap_or_default();
+        let pixels = |header: &acm_concept::camera::FrameHeader| {
+            let [color, depth] = self.pixels.get(&(header.camera.clone(), asked))?;
+            let metres = bytemuck::pod_collect_to_vec::<u8, f32>(depth.as_ref()?);
+            Some((color.clone()?, metres))
+        };
+        Answer::read(entry.record()?, pixels)
+            .context("record with `--trace-frames full`, or replay with `--resim`, which draws the frames anew")
+    }
+
+    fn file<T: DeserializeOwned>(&self, name: &str) -> anyhow::Result<T> {
+        let data = self.attached.get(name).with_context(|| format!("the trace has no `{name}`"))?;
+        serde_json::from_slice(data).with_context(|| format!("the trace's `{name}` is malformed"))
+    }
+}
+
+fn is_answer(header: &Header) -> bool {
+    header.from == HOST.0
+}
