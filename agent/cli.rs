@@ -7,6 +7,7 @@ use acm_actors::{
     remote::{Address, FrameMode},
     trace::FrameDetail,
 };
+use acm_concept::ids::FrameId;
 use acm_sim::Setting;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::{path::PathBuf, process::ExitCode, str::FromStr};
@@ -330,6 +331,12 @@ pub enum TraceCommand {
     Ls(TraceLsArgs),
     /// The messages of a run as a table; or one step's decision; or one message in full.
     Show(TraceShowArgs),
+    /// Why a message was sent: the decision behind it, what that rested on, what wrote that, and the frames seen.
+    Why(TraceWhyArgs),
+    /// The run for other tools: a page, lines of JSON, Chrome's trace events, point clouds.
+    Export(TraceExportArgs),
+    /// The viewer, served to the browser on this machine.
+    View(TraceViewArgs),
 }
 
 /// Arguments of `acm trace ls`.
@@ -366,6 +373,57 @@ pub struct TraceShowArgs {
     /// Print JSON instead of text: the messages in full.
     #[arg(long)]
     pub json: bool,
+}
+
+/// Arguments of `acm trace why`.
+#[derive(Debug, Args)]
+pub struct TraceWhyArgs {
+    /// The trace.
+    pub file: PathBuf,
+    /// The message.
+    #[arg(required_unless_present = "step", conflicts_with = "step")]
+    pub seq: Option<u64>,
+    /// The decision behind the Nth skill that was run.
+    #[arg(long, value_name = "N")]
+    pub step: Option<usize>,
+    /// Write the pixels in question into this folder, one PNG for each frame and object.
+    #[arg(long, value_name = "FOLDER")]
+    pub crops: Option<PathBuf>,
+    /// Print JSON instead of text: the nodes and their links.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `acm trace export`. `-` stands for standard output.
+#[derive(Debug, Args)]
+pub struct TraceExportArgs {
+    /// The trace.
+    pub file: PathBuf,
+    /// The viewer as one HTML file that needs no network.
+    #[arg(long, value_name = "FILE")]
+    pub html: Option<PathBuf>,
+    /// One line of JSON for each message, effect and change of memory.
+    #[arg(long, value_name = "FILE")]
+    pub jsonl: Option<PathBuf>,
+    /// Trace events for Perfetto or chrome://tracing.
+    #[arg(long, value_name = "FILE")]
+    pub chrome: Option<PathBuf>,
+    /// A point cloud (PLY) of each frame; needs a trace with --trace-frames full.
+    #[arg(long, value_name = "FOLDER")]
+    pub points: Option<PathBuf>,
+    /// The point cloud of this frame alone, such as F3.
+    #[arg(long, value_name = "F", requires = "points")]
+    pub frame: Option<FrameId>,
+}
+
+/// Arguments of `acm trace view`.
+#[derive(Debug, Args)]
+pub struct TraceViewArgs {
+    /// The trace.
+    pub file: PathBuf,
+    /// The port on 127.0.0.1; 0 takes a free one.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub port: u16,
 }
 
 /// The benches.

@@ -7,12 +7,26 @@
 //! | [`list`] | `acm trace ls`: one line a run |
 //! | [`show`] | `acm trace show`: the messages as a table |
 //! | [`decision`] | one step: what was considered, decided, predicted and found |
+//! | [`belief`] | what memory believed of each object, and the changes by which it came to that |
+//! | [`sight`] | what the cameras saw, and what was made of it |
+//! | [`picture`] | the pictures of a trace |
+//! | [`why`] | `acm trace why`: from a message back to the frames on which it rests |
+//! | [`export`] | `acm trace export`: other tools' forms |
+//! | [`page`] | the viewer as one HTML page |
+//! | [`view`] | `acm trace view`: the viewer on this machine |
 
+pub mod belief;
 pub mod decision;
+pub mod export;
 pub mod list;
+pub mod page;
+pub mod picture;
 pub mod recording;
 pub mod run_file;
 pub mod show;
+pub mod sight;
+pub mod view;
+pub mod why;
 
 use crate::cli::{Exit, TraceCommand};
 
@@ -21,5 +35,8 @@ pub fn run(command: &TraceCommand) -> anyhow::Result<Exit> {
     match command {
         TraceCommand::Ls(args) => list::run(args),
         TraceCommand::Show(args) => show::run(args),
+        TraceCommand::Why(args) => why::run(args),
+        TraceCommand::Export(args) => export::run(args),
+        TraceCommand::View(args) => view::run(args),
     }
 }
