@@ -60,7 +60,8 @@ impl Browser {
         self.call("Page.navigate", json!({ "url": url }));
         for _ in 0..1000 {
             if self.ask("document.readyState === 'complete' && location.href !== 'about:blank'") == true {
-                return self.settle();
+                self.settle();
+                return assert_eq!(self.complaints, Vec::<String>::new(), "{url}");
             }
         }
         panic!("{url} was not loaded; {:?}", self.complaints);

@@ -1,7 +1,7 @@
 
 // What is picked, links to it, search, keys, light and dark.
 
-let picked = 0, tab = "why", hits = [], byStep = false;
+let picked = 0, tab = "why", hits = [], byStep = false, anchor = 0;
 
 function details() {
   const row = rows[picked];
@@ -83,13 +83,15 @@ function follow() {
 function search(jump) {
   words = at("query").value.trim().toLowerCase();
   hits = words ? rows.map((_, index) => index).filter(index => textOf(index).includes(words)) : [];
-  if (words && jump && hits.length) pick(hits.find(index => index >= picked) ?? hits[0]);
+  if (words && jump && hits.length) pick(hits.find(index => index >= anchor) ?? hits[0]);
   found();
   soon();
 }
 function found() {
   const place = hits.indexOf(picked);
-  at("found").textContent = !words ? "" : !hits.length ? "nothing" : place < 0 ? `${hits.length} found` : `${place + 1} of ${hits.length}`;
+  const { kind, line } = rows[picked];
+  const where = `${kind} ${line}`.toLowerCase().includes(words) ? "" : ", in its body";
+  at("found").textContent = !words ? "" : !hits.length ? "nothing" : place < 0 ? `${hits.length} found` : `${place + 1} of ${hits.length}${where}`;
 }
 function nextHit(way) {
   if (!hits.length) return;
@@ -97,6 +99,8 @@ function nextHit(way) {
   pick(way > 0 ? later[0] ?? hits[0] : later.at(-1) ?? hits.at(-1));
   found();
 }
+// While a word is typed, the search goes on from where it began.
+at("query").addEventListener("focus", () => { anchor = picked; });
 at("query").addEventListener("input", () => search(true));
 at("query").addEventListener("keydown", event => {
   if (event.key === "Enter") { event.preventDefault(); nextHit(event.shiftKey ? -1 : 1); }

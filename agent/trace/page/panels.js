@@ -6,6 +6,17 @@ const seconds = t => `${t.toFixed(2)} s`;
 const none = text => make("p", { class: "faint" }, text);
 /// A button that leads to a message.
 const go = (seq, text) => make("button", { type: "button", class: "go", onclick: () => goTo(seq) }, text ?? String(seq));
+/// Gives texts places where they do not cover each other: each goes up by its own height until it is free.
+function layOut() {
+  const taken = [];
+  return (x, y, width, height) => {
+    const free = y => taken.every(([left, low, right, high]) => x > right || x + width < left || y - height > high || y < low);
+    let best = y;
+    for (let tries = 0; tries < 6 && !free(best); tries++) best -= height;
+    taken.push([x, best - height, x + width, best]);
+    return best;
+  };
+}
 const truthClass = { yes: "good", no: "bad", unknown: "open", VERIFIED: "good", CONTRADICTED: "bad", "CANNOT TELL": "open" };
 
 function table(titles, lines, numbers = []) {
@@ -25,9 +36,11 @@ function framePanel(seq) {
   const unit = width / 320;
   const marks = [];
   // A label that would leave the picture ends at its right edge.
+  const place = layOut();
   const label = (x, y, text) => {
-    const [size, late] = [10.5 * unit, x + text.length * 6 * unit > width];
-    return make("text", { x: late ? width - 2 * unit : x, y: Math.max(12 * unit, y), "text-anchor": late ? "end" : "start", style: `font-size:${size}px;stroke-width:${2.4 * unit}px` }, text);
+    const size = 10 * unit, long = text.length * 5.6 * unit;
+    const left = Math.max(2 * unit, Math.min(x, width - long - 2 * unit));
+    return make("text", { x: left, y: place(left, Math.max(12 * unit, y), long, size), style: `font-size:${size}px;stroke-width:${2.2 * unit}px` }, text);
   };
   const seen = new Set();
   for (const one of frame.seen) {
@@ -78,14 +91,15 @@ function mapOf(objects) {
   const xs = placed.map(([, e]) => e.at[0]), ys = placed.map(([, e]) => e.at[1]);
   const pad = 0.12, left = Math.min(...xs) - pad, right = Math.max(...xs) + pad, low = Math.min(...ys) - pad, high = Math.max(...ys) + pad;
   const width = Math.max(0.5, right - left), height = Math.max(0.2, high - low), unit = Math.max(width / 320, height / 140);
-  const parts = [];
+  const parts = [], place = layOut();
   for (const [id, entry] of placed) {
     const x = entry.at[0] - left, y = high - entry.at[1];
     const under = objects.get(entry.on);
     if (under?.at) parts.push(make("line", { x1: x, y1: y, x2: under.at[0] - left, y2: high - under.at[1], stroke: "currentColor", "stroke-width": unit }));
     const shade = entry.presence === "missing" ? "var(--bad)" : entry.verified ? "var(--good)" : "var(--open)";
     parts.push(make("circle", { cx: x, cy: y, r: 4.5 * unit, fill: entry.presence === "missing" ? "none" : shade, stroke: shade, "stroke-width": 1.5 * unit }));
-    parts.push(make("text", { x: x + 7 * unit, y: y + 3.5 * unit, style: `font-size:${10.5 * unit}px` }, `${id} ${entry.category}`));
+    const [beside, name] = [x + 7 * unit, `${id} ${entry.category}`];
+    parts.push(make("text", { x: beside, y: place(beside, y + 3.5 * unit, name.length * 6 * unit, 10 * unit), style: `font-size:${10.5 * unit}px` }, name));
   }
   return make("svg", { class: "map", viewBox: `0 0 ${Math.max(width, 320 * unit)} ${height}`, role: "img", "aria-label": "Objects from above, x to the right, y up" }, ...parts);
 }
@@ -96,15 +110,16 @@ function memoryPanel(seq) {
   const span = rows[rowOf(seq)];
   const lines = stacked(objects).map(([id, depth]) => {
     const entry = objects.get(id);
-    const place = entry.presence === "held" ? "in the hand" : entry.at ? entry.at.map(value => value.toFixed(3)).join("\u2002") : "?";
-    const state = [...(entry.state ?? []), ...(entry.verified ? [] : ["not verified"])].join(", ");
+    const where = entry.presence === "held" ? "in the hand" : entry.at ? entry.at.map(value => value.toFixed(3)).join("\u2002") : "?";
+    const notes = [...(entry.on ? [`on ${entry.on}`] : []), ...(entry.state ?? []), ...(entry.verified ? [] : ["not verified"]), ...(entry.may_be?.length ? [`may be ${entry.may_be.map(([other]) => other).join(", ")}`] : [])];
+    const missing = entry.presence === "missing";
     return {
       state: entry.seq >= span.seq && entry.seq <= span.last ? "new" : undefined,
-      cells: [make("span", { style: `padding-left:${12 * depth}px` }, (depth ? "\u2514 " : "") + id), entry.category,
-        make("span", { class: entry.presence === "missing" ? "bad" : undefined }, entry.presence), make("span", { class: "fixed" }, place), entry.on ?? "", state, entry.confidence?.toFixed(2) ?? ""],
+      cells: [make("div", { style: `padding-left:${12 * depth}px` }, make("span", {}, `${depth ? "\u2514 " : ""}${id} ${entry.category}`), ...(notes.length ? [make("div", { class: "small" }, notes.join(", "))] : [])),
+        make("span", { class: missing ? "fixed bad" : "fixed" }, missing ? `gone from ${where}` : where), entry.confidence?.toFixed(2) ?? ""],
     };
   });
-  return [mapOf(objects), make("div", { class: "scroll" }, table(["id", "what", "is", "at x y z (m)", "on", "state", "conf."], lines, [6]))];
+  return [mapOf(objects), make("div", { class: "scroll" }, table(["object", "at x y z (m)", "conf."], lines, [2]))];
 }
 
 // ---- why
@@ -182,7 +197,8 @@ function planPanel(seq) {
   if (!step) return [none("Nothing was decided up to here.")];
   const out = [make("div", { class: "strong" }, step.title), make("div", {}, `Goal: ${step.goal}`), make("div", { class: "faint" }, `asked for by \u201c${step.subtask}\u201d`)];
   out.push(make("h3", {}, "Plan"), make("ol", { class: "plan" }, ...step.plan.map(words => make("li", {}, words))));
-  const truth = one => make("span", { class: truthClass[one.truth] }, { yes: "holds", no: "does not hold", unknown: "unknown" }[one.truth]);
+  // That the goal does not hold yet is no trouble.
+  const truth = one => make("span", { class: one.role === "goal" ? undefined : truthClass[one.truth] }, { yes: "holds", no: "does not hold", unknown: "unknown" }[one.truth]);
   for (const [role, title] of [["precondition", "Preconditions"], ["goal", "Goal state when it was decided"]]) {
     const list = step.conditions.filter(one => one.role === role);
     if (list.length) out.push(make("h3", {}, title), table(["literal", "believed", "conf.", "because"], list.map(one => ({ cells: [make("code", {}, one.literal), truth(one), one.confidence.toFixed(2), one.reason] })), [2]));

@@ -254,7 +254,10 @@ impl<'a> Answer<'a> {
             lines.push(format!("retrieved {} {:.3} ({})", hit.object, hit.score, terms.join(", ")));
         }
         let dropped = reference.retrieval.iter().flat_map(|retrieval| &retrieval.dropped);
-        lines.extend(dropped.map(|(object, filter)| format!("dropped {object} by {filter}")));
+        let dropped: Vec<String> = dropped.map(|(object, filter)| format!("{object} by {filter}")).collect();
+        if !dropped.is_empty() {
+            lines.push(format!("dropped {}", dropped.join(", ")));
+        }
         lines.extend(reference.recall.as_ref().map(|recall| match recall {
             Recall::Known { confidence, evidence, .. } => {
                 let evidence: Vec<String> = evidence.iter().map(decision::evidence_words).collect();
