@@ -190,8 +190,6 @@ impl World {
         for step in 1..=steps {
             self.step(f64::from(step) / f64::from(steps));
         }
-        let hands: Vec<_> = self.robot.hands(&self.physics).collect();
-        self.audit.grip(&hands, self.seconds());
         self.timings.physics_s += cpu_s(ClockId::ThreadCPUTime) - started;
         self.robot.end()
     }

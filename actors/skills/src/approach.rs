@@ -2,7 +2,7 @@
 //! perceived solids, and how to get there.
 
 use crate::{
-    clearance::{FREE_M, SAFETY_M},
+    clearance::{FREE_M, PERCEPTION_ERROR_M, ROOMY_M, SAFETY_M},
     controller::StartError,
     geometry::{hand_radius_m, top_of},
     hand::Hand,
@@ -95,19 +95,36 @@ impl Surroundings {
     }
 }
 
-/// The freest of some ways to act at a pose after coming `standoff_m` straight up to it; the first with enough room is
-/// taken, so the best-liked come first. An overlap up to `tolerated_m` is accepted where nothing is freer.
+/// How much wider than the part the fingers are on the way to it, the most absorbing first; metres.
+const SPREADS_M: [f64; 4] = [0.03, 0.02, 0.012, 0.008];
+
+/// How wide the fingers may be on the way to a part that they close on, widest first; `least_m` is the spread that they
+/// need at least.
+///
+/// # Errors
+/// The hand does not open so far.
+pub(crate) fn openings(hand: &Hand, width_m: f64, least_m: f64) -> Result<Vec<f64>, StartError> {
+    let largest_m = hand.robot.max_opening_m;
+    match width_m + least_m > largest_m {
+        true => Err(StartError::TooWide { width_m, opening_m: largest_m }),
+        false => Ok(SPREADS_M.map(|spread_m| (width_m + spread_m).min(largest_m)).to_vec()),
+    }
+}
+
+/// The freest of some ways to act at a pose after coming `standoff_m` straight up to it, and how wide the fingers are then.
+/// The first with enough room is taken, so the best-liked come first, and fingers close only where wider ones do not fit.
+/// An overlap that may be an error of perception is accepted where nothing is freer.
 pub(crate) fn choose(
     hand: &Hand,
     what: &'static str,
-    candidates: impl IntoIterator<Item = Pose>,
-    opening_m: f64,
+    candidates: &[Pose],
+    openings_m: &[f64],
     standoff_m: f64,
     around: &Surroundings,
-    [roomy_m, tolerated_m]: [f64; 2],
-) -> Result<Pose, StartError> {
-    let (mut best, mut refusal): (Option<(Pose, f64)>, _) = (None, None);
-    for pose in candidates {
+) -> Result<(Pose, f64), StartError> {
+    let (mut best, mut refusal): (Option<(Pose, f64, f64)>, _) = (None, None);
+    let ways = openings_m.iter().flat_map(|opening_m| candidates.iter().map(|pose| (*pose, *opening_m)));
+    for (pose, opening_m) in ways {
         let before = drawn_back(&pose, standoff_m);
         let outside = [pose, before].into_iter().find(|at| !hand.robot.reaches(at.translation));
         if let Some(outside) = outside {
@@ -115,16 +132,16 @@ pub(crate) fn choose(
             continue;
         }
         let room_m = around.room_between_m(&hand.robot, &before, &pose, opening_m);
-        if room_m >= roomy_m {
-            return Ok(pose);
+        if room_m >= ROOMY_M {
+            return Ok((pose, opening_m));
         }
-        if best.is_none_or(|(_, best_m)| room_m > best_m) {
-            best = Some((pose, room_m));
+        if best.is_none_or(|(_, _, best_m)| room_m > best_m) {
+            best = Some((pose, opening_m, room_m));
         }
     }
     match (best, refusal) {
-        (Some((pose, room_m)), _) if room_m >= -tolerated_m => Ok(pose),
-        (Some((_, room_m)), _) => Err(StartError::Blocked { what, overlap_m: -room_m }),
+        (Some((pose, opening_m, room_m)), _) if room_m >= -PERCEPTION_ERROR_M => Ok((pose, opening_m)),
+        (Some((_, _, room_m)), _) => Err(StartError::Blocked { what, overlap_m: -room_m }),
         (None, Some(position)) => {
             let (min, max) = (hand.robot.workspace_min, hand.robot.workspace_max);
             Err(StartError::OutOfReach { what, position, min, max })

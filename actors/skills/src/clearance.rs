@@ -14,6 +14,10 @@ use acm_concept::{
 };
 use glam::{DVec2, DVec3};
 
+/// Room that a hand should have to every perceived neighbour, metres.
+pub(crate) const ROOMY_M: f64 = 0.005;
+/// How far perceived geometry may be off: an overlap up to this is tried, carefully; metres.
+pub(crate) const PERCEPTION_ERROR_M: f64 = 0.008;
 /// Distance between sample points on the hand's solids, metres.
 const SPACING_M: f64 = 0.006;
 /// Most sample points along one side of a solid.

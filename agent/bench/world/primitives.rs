@@ -4,7 +4,7 @@ pub mod rig;
 pub mod table;
 pub mod trial;
 
-use super::progress;
+use super::{audited, progress};
 use crate::{
     bench::{BenchResult, Row},
     cli::BenchArgs,
@@ -43,6 +43,7 @@ pub fn measure(args: &BenchArgs, result: &mut BenchResult) -> Result<()> {
         for reason in found.words.keys().take(REASONS) {
             result.notes.push(format!("{} / {}: {reason}", cell.primitive, cell.name));
         }
+        audited(result, found.violations);
         results.push(found);
     }
     for (robot, cells) in table.by_robot() {
@@ -66,6 +67,7 @@ fn robot_row(table: &Table, robot: &str, cells: &[Cell], result: &mut BenchResul
         let found = run_cell(table, cell, 0..1)?;
         bar.inc(1);
         right += found.right;
+        audited(result, found.violations);
         let what = || format!("{} / {}", cell.primitive, cell.name);
         others.extend(found.words.keys().map(|words| format!("{}: {words}", what())));
     }
@@ -88,6 +90,8 @@ pub struct CellResult {
     pub false_done: usize,
     /// Greatest force at the wrist, newtons.
     pub most_n: f64,
+    /// What the physics audit found in all of them.
+    pub violations: u64,
     /// What was said, or was wrong, where it did not end right; with how often.
     pub words: BTreeMap<String, usize>,
 }
@@ -123,16 +127,20 @@ pub struct Figures {
 /// # Errors
 /// A world cannot be built.
 pub fn run_cell(table: &Table, cell: &Cell, seeds: std::ops::Range<u64>) -> Result<CellResult> {
-    let mut result =
-        CellResult { cell: cell.clone(), tried: 0, right: 0, false_done: 0, most_n: 0.0, words: BTreeMap::new() };
+    let (of, words) = (cell.clone(), BTreeMap::new());
+    let mut result = CellResult { cell: of, tried: 0, right: 0, false_done: 0, most_n: 0.0, violations: 0, words };
     for seed in seeds {
-        let Trial { done, right, words, most_n } = trial::run(cell, &table.draw(cell, seed), seed)?;
-        let good = if cell.fault.is_some() { !done && !words.is_empty() } else { done && right };
+        let Trial { done, right, words, most_n, audit } = trial::run(cell, &table.draw(cell, seed), seed)?;
+        let as_it_should = if cell.fault.is_some() { !done && !words.is_empty() } else { done && right };
+        // What has no cause voids the case.
+        let good = as_it_should && audit.violations == 0;
+        result.violations += audit.violations;
         result.tried += 1;
         result.right += usize::from(good);
         result.false_done += usize::from(done && !right);
         result.most_n = result.most_n.max(most_n);
         if !good {
+            let words = audit.first.iter().fold(words, |words, told| format!("{words} audit: {told}"));
             *result.words.entry(format!("{words} (seed {seed})")).or_default() += 1;
         }
     }

@@ -4,6 +4,7 @@ use super::wrist::{FINGERS, Wrist, free_body};
 use crate::{
     convert::{from_engine, to_engine, vector},
     model::shape::shape,
+    profile::SUBSTEPS,
 };
 use acm_concept::{embodiment::RobotDescription, pose::Pose};
 use glam::DVec3;
@@ -69,6 +70,16 @@ impl Fingers {
         let position = |finger| world.bodies.get(finger).map_or(DVec3::ZERO, |body| body.translation().as_dvec3());
         let [first, second] = self.fingers.map(position);
         (first - second).dot(axis).max(0.0)
+    }
+
+    /// What the drive pressed the fingers together with in the last physics step, newtons; below 0 while it opens them.
+    pub(crate) fn grip_n(&self, world: &PhysicsWorld) -> f64 {
+        let motor = |joint| {
+            world.impulse_joints.get(joint).map_or(0.0, |joint| joint.data.motors[JointAxis::LinX as usize].impulse)
+        };
+        let impulse = self.joints.iter().map(|joint| f64::from(motor(*joint))).sum::<f64>();
+        // The engine keeps the impulse of the last substep alone.
+        0.5 * impulse * SUBSTEPS as f64 / f64::from(world.integration_parameters.dt)
     }
 
     /// Poses of the two fingers' frames (origin on the pad, finger at +y of the first and -y of the second).

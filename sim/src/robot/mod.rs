@@ -179,14 +179,13 @@ impl Robot {
         self.limbs.iter().flat_map(of).collect()
     }
 
-    /// What the physics audit looks at: where the hands are, what their pads feel, and what they can.
+    /// What the physics audit looks at: where the hands are, how they grip, and what they can.
     pub(crate) fn hands<'a>(&'a self, world: &'a PhysicsWorld) -> impl Iterator<Item = audit::Hand> + 'a {
         self.limbs.iter().map(|limb| {
             let tcp = limb.wrist.tcp(world);
             audit::Hand {
                 at: tcp.translation,
-                pads_n: limb.forces.mean().0.map(|force| tcp.inverse().transform_vector(force)),
-                wrist_n: limb.forces.mean().1.length(),
+                grip_n: if let Hand::Fingers(fingers) = &limb.hand { fingers.grip_n(world) } else { 0.0 },
                 max_speed_m_s: limb.robot.max_speed_m_s,
                 max_grip_n: limb.robot.max_grip_force_n,
             }

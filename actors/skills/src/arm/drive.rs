@@ -6,7 +6,7 @@ use super::{
     scene::Scene,
     timing::timed,
 };
-use crate::{functions::PERCEPTION_ERROR_M, motion::Path};
+use crate::{clearance::PERCEPTION_ERROR_M, motion::Path};
 use acm_concept::{
     arm::{ArmDescription, Joints},
     embodiment::RobotDescription,

@@ -1,8 +1,8 @@
 //! What opening, closing, turning and dragging share: take hold of a part, or press against it, and follow its joint.
 
-use super::{PERCEPTION_ERROR_M, ROOMY_M, argument, ending, number};
+use super::{argument, ending, number};
 use crate::{
-    approach::{Surroundings, TILTS, choose, drawn_back, facing, tilted, turned_about, way},
+    approach::{Surroundings, TILTS, choose, drawn_back, facing, openings, tilted, turned_about, way},
     articulation::Articulation,
     controller::StartError,
     hand::Hand,
@@ -20,8 +20,6 @@ use acm_concept::{
 };
 use glam::DVec3;
 
-/// How much wider than the part the fingers are on the way to it, metres.
-const SPREAD_M: f64 = 0.03;
 /// The least spread a part must leave, metres.
 const LEAST_SPREAD_M: f64 = 0.006;
 /// Distance from the part at which the hand comes to rest before it goes to it, metres.
@@ -186,17 +184,12 @@ impl DrawKind {
 impl Draw {
     pub fn plan(invocation: &SkillInvocation, hand: &Hand, kind: DrawKind) -> Result<Draw, StartError> {
         let width_m = argument(invocation, "grip_width")?;
-        let largest_m = hand.robot.max_opening_m;
-        if width_m + LEAST_SPREAD_M > largest_m {
-            return Err(StartError::TooWide { width_m, opening_m: largest_m });
-        }
-        let opening_m = (width_m + SPREAD_M).min(largest_m);
+        let openings_m = openings(hand, width_m, LEAST_SPREAD_M)?;
         let around = surroundings(invocation);
         let straight = facing(&invocation.frame);
         let straight = nearer_turn(hand, straight);
         let candidates = TILTS.map(|angle| tilted(&straight, angle));
-        let room = [ROOMY_M, PERCEPTION_ERROR_M];
-        let grasp_at = choose(hand, kind.what, candidates, opening_m, STANDOFF_M, &around, room)?;
+        let (grasp_at, opening_m) = choose(hand, kind.what, &candidates, &openings_m, STANDOFF_M, &around)?;
         Ok(Draw {
             object: invocation.part.object,
             felt: kind.felt,
@@ -322,7 +315,7 @@ impl Drive {
         let straight = nearer_turn(hand, tips);
         let quarter = straight * Pose::from_yaw(DVec3::ZERO, std::f64::consts::FRAC_PI_2);
         let back = invocation.frame.transform_vector(DVec3::Z);
-        Drive::at(invocation, hand, kind, [straight, quarter], back)
+        Drive::at(invocation, hand, kind, &[straight, quarter], back)
     }
 
     /// With the hand in one of some poses in which it touches the part.
@@ -330,11 +323,11 @@ impl Drive {
         invocation: &SkillInvocation,
         hand: &Hand,
         kind: DriveKind,
-        contacts: impl IntoIterator<Item = Pose>,
+        contacts: &[Pose],
         back: DVec3,
     ) -> Result<Drive, StartError> {
         let around = surroundings(invocation);
-        let contact = choose(hand, kind.what, contacts, 0.0, RUN_UP_M, &around, [ROOMY_M, PERCEPTION_ERROR_M])?;
+        let (contact, _) = choose(hand, kind.what, contacts, &[0.0], RUN_UP_M, &around)?;
         let lever = match kind.joint {
             Articulation::Prismatic { .. } => 1.0,
             Articulation::Revolute { .. } => kind.joint.lever_m(contact.translation).max(0.02),

@@ -4,7 +4,6 @@
 //! takes from under the tips is felt to do so; then the tips go in behind its edge and see to it that it is open so far.
 
 use super::{
-    PERCEPTION_ERROR_M, ROOMY_M,
     articulated::{DrawKind, Felt, LEAVE_M, note_travel, surroundings},
     ending,
 };
@@ -47,8 +46,7 @@ impl Drag {
         let quarter = tips * Pose::from_yaw(DVec3::ZERO, FRAC_PI_2);
         let mut contacts = [tips, quarter, turned_about(&tips), turned_about(&quarter)];
         contacts.sort_by(|a, b| hand.command.tcp.angle_to(a).total_cmp(&hand.command.tcp.angle_to(b)));
-        let room = [ROOMY_M, PERCEPTION_ERROR_M];
-        let contact = choose(hand, kind.what, contacts, 0.0, STANDOFF_M, &around, room)?;
+        let (contact, _) = choose(hand, kind.what, &contacts, &[0.0], STANDOFF_M, &around)?;
         Ok(Drag {
             object: invocation.part.object,
             felt: kind.felt,

@@ -5,12 +5,12 @@
 //! the upright axis through its base (1 if absent; 0 for round things): their approaches are tried as well.
 
 use super::{
-    PERCEPTION_ERROR_M, ROOMY_M, argument,
+    argument,
     articulated::{all_around, surroundings},
     number, require_empty_hand,
 };
 use crate::{
-    approach::{Surroundings, TILTS, choose, drawn_back, facing, tilted, turned_about, way},
+    approach::{Surroundings, TILTS, choose, drawn_back, facing, openings, tilted, turned_about, way},
     clearance::SAFETY_M,
     controller::StartError,
     hand::Hand,
@@ -28,8 +28,7 @@ use acm_concept::{
 use glam::DVec3;
 use std::f64::consts::TAU;
 
-/// How much wider than the thing the fingers are on the way to it, and the least; metres.
-const SPREAD_M: f64 = 0.03;
+/// How much wider than the thing the fingers must be on the way to it, metres.
 const LEAST_SPREAD_M: f64 = 0.008;
 /// Sides of a round thing that are tried.
 const ROUND_SIDES: u32 = 8;
@@ -60,20 +59,9 @@ impl GraspAlong {
     pub fn plan(invocation: &SkillInvocation, hand: &Hand, feedback: &Feedback) -> Result<GraspAlong, StartError> {
         require_empty_hand(invocation, feedback)?;
         let (width_m, height_m) = (argument(invocation, "grip_width")?, argument(invocation, "height")?);
-        let largest_m = hand.robot.max_opening_m;
-        if width_m + LEAST_SPREAD_M > largest_m {
-            return Err(StartError::TooWide { width_m, opening_m: largest_m });
-        }
-        let opening_m = (width_m + SPREAD_M).min(largest_m);
-        let at = choose(
-            hand,
-            "grasp it",
-            candidates(invocation, hand),
-            opening_m,
-            STANDOFF_M,
-            &surroundings(invocation),
-            [ROOMY_M, PERCEPTION_ERROR_M],
-        )?;
+        let openings_m = openings(hand, width_m, LEAST_SPREAD_M)?;
+        let (candidates, around) = (candidates(invocation, hand), surroundings(invocation));
+        let (at, opening_m) = choose(hand, "grasp it", &candidates, &openings_m, STANDOFF_M, &around)?;
         Ok(GraspAlong {
             object: invocation.part.object,
             base: invocation.target.pose.pose,

@@ -3,9 +3,12 @@
 //! Arguments: `grip_width`, the distance between the faces across the frame's y axis; optionally `cross_width`,
 //! the same across its x axis; `height`, the part's height over its base. Metres.
 
-use super::{PERCEPTION_ERROR_M, ROOMY_M, argument, require_empty_hand, within_ceiling};
+use super::{argument, require_empty_hand, within_ceiling};
 use crate::{
-    clearance::{GUARD_M, SAFETY_M, approach_clearance, obstacles, safe_height, within_guarded_reach, within_reach},
+    clearance::{
+        GUARD_M, PERCEPTION_ERROR_M, ROOMY_M, SAFETY_M, approach_clearance, obstacles, safe_height,
+        within_guarded_reach, within_reach,
+    },
     controller::StartError,
     geometry::{downward, nearest_heading},
     hand::Hand,

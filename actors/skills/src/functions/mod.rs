@@ -29,11 +29,6 @@ use crate::{
 };
 use acm_concept::{embodiment::Feedback, skill::SkillInvocation};
 
-/// Room that a hand should have to every perceived neighbour, metres.
-pub(crate) const ROOMY_M: f64 = 0.005;
-/// How far perceived geometry may be off: an overlap up to this is tried, carefully; metres.
-pub(crate) const PERCEPTION_ERROR_M: f64 = 0.008;
-
 /// A named argument that must be finite and positive.
 pub(crate) fn argument(invocation: &SkillInvocation, name: &'static str) -> Result<f64, StartError> {
     let value = invocation.arguments.get(name).copied();

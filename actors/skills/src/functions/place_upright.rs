@@ -5,10 +5,13 @@
 //!
 //! Argument: `height`, of what is held over its base, which the hand clears when it leaves; metres.
 
-use super::{PERCEPTION_ERROR_M, argument, ending, within_ceiling};
+use super::{argument, ending, within_ceiling};
 use crate::{
     approach::Surroundings,
-    clearance::{GUARD_M, SAFETY_M, approach_clearance, obstacles, safe_height, within_guarded_reach, within_reach},
+    clearance::{
+        GUARD_M, PERCEPTION_ERROR_M, SAFETY_M, approach_clearance, obstacles, safe_height, within_guarded_reach,
+        within_reach,
+    },
     controller::StartError,
     geometry::{downward, points_down},
     hand::{Hand, holds_something, pads_in_contact},

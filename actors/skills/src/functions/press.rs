@@ -4,9 +4,7 @@
 //! travel, metres; `force`, at which it is taken to be at its end, newtons. A thing that pushes back with less than about
 //! a newton is not felt to give way.
 
-use super::{
-    PERCEPTION_ERROR_M, ROOMY_M, argument, articulated::surroundings, ending, press_down::judge, require_empty_hand,
-};
+use super::{argument, articulated::surroundings, ending, press_down::judge, require_empty_hand};
 use crate::{
     approach::{Surroundings, choose, drawn_back, facing, turned_about, way},
     clearance::GUARD_M,
@@ -43,8 +41,7 @@ impl Press {
         let quarter = tips * Pose::from_yaw(DVec3::ZERO, FRAC_PI_2);
         let mut contacts = [tips, quarter, turned_about(&tips), turned_about(&quarter)];
         contacts.sort_by(|a, b| hand.command.tcp.angle_to(a).total_cmp(&hand.command.tcp.angle_to(b)));
-        let room = [ROOMY_M, PERCEPTION_ERROR_M];
-        let contact = choose(hand, "press it", contacts, 0.0, GUARD_M, &around, room)?;
+        let (contact, _) = choose(hand, "press it", &contacts, &[0.0], GUARD_M, &around)?;
         let plan = PressPlan { surface_m: GUARD_M, search_m: SEARCH_M, stroke_m, force_n };
         Ok(Press { object: invocation.part.object, contact, around, plan })
     }

@@ -4,9 +4,12 @@
 //! newtons. The frame lies on the surface that is pressed. A thing that pushes back with less than about a newton is
 //! not felt to give way.
 
-use super::{PERCEPTION_ERROR_M, ROOMY_M, argument, require_empty_hand, within_ceiling};
+use super::{argument, require_empty_hand, within_ceiling};
 use crate::{
-    clearance::{GUARD_M, approach_clearance, obstacles, safe_height, within_guarded_reach, within_reach},
+    clearance::{
+        GUARD_M, PERCEPTION_ERROR_M, ROOMY_M, approach_clearance, obstacles, safe_height, within_guarded_reach,
+        within_reach,
+    },
     controller::StartError,
     geometry::{downward, nearest_heading},
     hand::Hand,

@@ -37,7 +37,7 @@ pub(crate) fn plan(invocation: &SkillInvocation, hand: &Hand) -> Result<Drive, S
         to_stop: false,
         felt: Felt::Nothing,
     };
-    Drive::at(invocation, hand, kind, contacts, DVec3::Z)
+    Drive::at(invocation, hand, kind, &contacts, DVec3::Z)
 }
 
 /// Half of the extents of the closed fingers across the approach direction, metres.

@@ -4,7 +4,7 @@
 //! metres; `opening`, how wide the fingers then are, metres (as they are if absent).
 
 use super::{
-    PERCEPTION_ERROR_M, ROOMY_M, argument,
+    argument,
     articulated::{all_around, surroundings},
     number,
 };
@@ -40,15 +40,7 @@ impl Reach {
         };
         let before = Pose::from_translation(-(distance_m + hand.tip_reach_m) * DVec3::Z);
         let candidates = TILTS.map(|angle| tilted(&first, angle) * before);
-        let to = choose(
-            hand,
-            "reach it",
-            candidates,
-            opening_m,
-            0.0,
-            &surroundings(invocation),
-            [ROOMY_M, PERCEPTION_ERROR_M],
-        )?;
+        let (to, _) = choose(hand, "reach it", &candidates, &[opening_m], 0.0, &surroundings(invocation))?;
         Ok(Reach { object: invocation.part.object, to, opening_m, around: all_around(invocation) })
     }
 }

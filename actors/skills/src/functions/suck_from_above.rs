@@ -2,9 +2,12 @@
 //!
 //! Arguments: `height`, the part's height over its base, metres. The top face is taken to be level.
 
-use super::{PERCEPTION_ERROR_M, argument, require_empty_hand, within_ceiling};
+use super::{argument, require_empty_hand, within_ceiling};
 use crate::{
-    clearance::{GUARD_M, SAFETY_M, approach_clearance, obstacles, safe_height, within_guarded_reach, within_reach},
+    clearance::{
+        GUARD_M, PERCEPTION_ERROR_M, SAFETY_M, approach_clearance, obstacles, safe_height, within_guarded_reach,
+        within_reach,
+    },
     controller::StartError,
     geometry::{downward, nearest_heading},
     hand::{Hand, holds_something},

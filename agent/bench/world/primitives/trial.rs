@@ -11,6 +11,7 @@ use acm_concept::{
     skill::{SkillInvocation, SkillReport},
     solid::{PlacedSolid, Solid},
 };
+use acm_sim::AuditReport;
 use anyhow::Result;
 use glam::{DQuat, DVec2, DVec3};
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -42,6 +43,8 @@ pub struct Trial {
     pub words: String,
     /// Greatest force at the wrist, newtons.
     pub most_n: f64,
+    /// What the physics audit found.
+    pub audit: AuditReport,
 }
 
 /// The thing of a cell.
@@ -141,7 +144,8 @@ fn attempt(cell: &Cell, values: &Values, seed: u64, slip_s: Option<f64>) -> Resu
         },
         Err(reason) => (false, false, reason),
     };
-    Ok((Trial { done, right, words, most_n: stage.rig.most_n }, stage.window))
+    let (most_n, audit) = (stage.rig.most_n, stage.rig.simulation.audit());
+    Ok((Trial { done, right, words, most_n, audit }, stage.window))
 }
 
 /// A world and what is tried in it.
