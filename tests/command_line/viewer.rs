@@ -137,6 +137,9 @@ fn a_thousand_steps_of_hostile_names_stay_a_page() {
     for key in ["Home", "End"] {
         browser.key(key);
         assert!(browser.ask("document.querySelectorAll('.row').length").as_u64().unwrap() < 80);
+        // The arrows lie where the rows lie.
+        let same = "['top', 'height'].every(side => Math.abs(arrows.getBoundingClientRect()[side] - lanes.getBoundingClientRect()[side]) < 1)";
+        assert_eq!(browser.ask(same), true);
     }
     assert!(browser.ask("rows.length").as_u64().unwrap() > 10_000);
     for _ in 0..20 {

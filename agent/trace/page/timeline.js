@@ -29,10 +29,9 @@ function fitted(canvas, width, height) {
 
 function heads() {
   const few = narrow();
-  at("heads").style.height = few ? "18px" : "34px";
   at("heads").replaceChildren(...actors.map((actor, lane) => {
-    const head = make("span", { style: `left:${laneX(actor)}px;top:${few ? 1 : 2 + lane % 2 * 14}px`, title: actor });
-    head.textContent = few ? actor.slice(0, 2) : actor;
+    const head = make("span", { style: `left:${laneX(actor)}px;top:${2 + lane % 2 * 14}px`, title: actor });
+    head.textContent = few ? actor.slice(0, 3) : actor;
     return head;
   }));
 }
