@@ -95,6 +95,7 @@ struct FrameRow {
     /// Objects that were expected and not seen, with what the frame says of them.
     unseen: Vec<(String, &'static str)>,
     blindness: Option<String>,
+    same_as: Option<FrameId>,
     picture: Option<String>,
 }
 
@@ -227,6 +228,7 @@ fn frame_row(sight: &Sight) -> FrameRow {
         seen: sight.seen.clone(),
         unseen: unseen.map(|(object, visibility)| (object.to_string(), sight::visibility_word(*visibility))).collect(),
         blindness: sight.blindness.clone(),
+        same_as: sight.same_as,
         picture: None,
     }
 }

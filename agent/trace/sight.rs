@@ -29,6 +29,8 @@ pub struct Sight {
     pub expected: Vec<(ObjectId, Visibility)>,
     /// Why nothing could be grounded, if so.
     pub blindness: Option<String>,
+    /// The first frame of this camera whose colour is the same bit for bit: a sensor with noise gives no two.
+    pub same_as: Option<FrameId>,
 }
 
 /// Something that a frame shows.
@@ -93,6 +95,7 @@ struct UpdatedBody {
 /// The frames of a run by their numbers. Messages of another form than today's are passed over.
 pub fn sights(run: &RunFile) -> BTreeMap<FrameId, Sight> {
     let (mut sights, mut last) = (BTreeMap::new(), None);
+    let same_as = same_pictures(run);
     for entry in &run.entries {
         match entry.header.kind.as_str() {
             "frame" => {
@@ -103,6 +106,7 @@ pub fn sights(run: &RunFile) -> BTreeMap<FrameId, Sight> {
                     seen: Vec::new(),
                     expected: Vec::new(),
                     blindness: None,
+                    same_as: same_as.get(&header.id).copied(),
                     header,
                 };
                 sights.insert(sight.header.id, sight);
@@ -128,6 +132,21 @@ pub fn sights(run: &RunFile) -> BTreeMap<FrameId, Sight> {
         }
     }
     sights
+}
+
+/// For each frame whose colour was there before, bit for bit, the first one that had it.
+fn same_pictures(run: &RunFile) -> BTreeMap<FrameId, FrameId> {
+    let (mut first, mut same) = (BTreeMap::new(), BTreeMap::new());
+    for effect in run.effects.iter().filter(|effect| effect.kind == "frame") {
+        let text = |name: &str| effect.record.get(name).and_then(|value| value.as_str());
+        let (Some(camera), Some(hash)) = (text("camera"), text("color_blake3")) else { continue };
+        let Some(frame) = text("frame").and_then(|frame| frame.parse::<FrameId>().ok()) else { continue };
+        let earlier = *first.entry((camera, hash)).or_insert(frame);
+        if earlier != frame {
+            same.insert(frame, earlier);
+        }
+    }
+    same
 }
 
 fn body<T: for<'a> Deserialize<'a>>(entry: &Entry) -> Option<T> {
@@ -201,7 +220,15 @@ mod tests {
             intrinsics: Intrinsics { width: 200, height: 100, fx: 100.0, fy: 100.0, cx: 99.5, cy: 49.5 },
             camera_pose: Pose::from_translation(DVec3::new(0.0, 0.0, -2.0)),
         };
-        let sight = Sight { header, seq: 1, updated: None, seen: Vec::new(), expected: Vec::new(), blindness: None };
+        let sight = Sight {
+            header,
+            seq: 1,
+            updated: None,
+            seen: Vec::new(),
+            expected: Vec::new(),
+            blindness: None,
+            same_as: None,
+        };
         // Two metres ahead six centimetres are three pixels.
         assert_eq!(sight.around(DVec3::ZERO), Some([97, 47, 103, 53]));
         assert_eq!(sight.around(DVec3::new(0.0, 0.0, -3.0)), None);

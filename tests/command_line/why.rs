@@ -116,3 +116,20 @@ fn what_the_trace_does_not_hold_is_said_and_bad_questions_are_refused() {
     let told = prints(&["trace", "why", part.to_str().unwrap(), "--step", "1"]);
     assert!(told.lines().last().unwrap().starts_with("CUT: "), "{told}");
 }
+
+#[test]
+fn a_decision_to_give_up_names_what_was_seen_last() {
+    let dir = tempfile::tempdir().unwrap();
+    for (fault, told) in
+        [("black-frames", "shows nothing: no-depth"), ("freeze-frames", "bit for bit the picture of F0")]
+    {
+        let path = dir.path().join("run.mcap");
+        let file = path.to_str().unwrap();
+        let run = ["run", "put-back-block", "--seed", "3", "--json", "--inject", fault, "--trace", file];
+        crate::acm().args(run).output().unwrap();
+        let messages = json(&["trace", "show", file, "--kind", "decided", "--json"]);
+        let last = list(&messages, "messages").last().unwrap()["seq"].to_string();
+        let why = prints(&["trace", "why", file, &last]);
+        assert!(why.contains(told), "{fault}: no `{told}` in: {why}");
+    }
+}

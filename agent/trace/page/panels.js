@@ -65,6 +65,7 @@ function framePanel(seq) {
   const under = make("div", { class: "under" }, make("span", { class: "strong" }, frame.id), ` of ${frame.camera}, ${width}x${height}, ${seconds(frame.t)}, message `, go(frame.seq));
   const lines = [];
   if (frame.blindness) lines.push(make("div", { class: "under bad" }, `Shows nothing: ${frame.blindness}`));
+  if (frame.same_as) lines.push(make("div", { class: "under open" }, `Bit for bit the picture of ${frame.same_as}`));
   for (const [object, words] of frame.unseen) lines.push(make("div", { class: "under open" }, `${object} ${words}`));
   return [stage, under, ...lines];
 }

@@ -109,29 +109,53 @@ function arrow(pen, from, to, y, both) {
   if (both) head(from, -side); else { pen.beginPath(); pen.arc(from, y, 2.2, 0, 7); pen.fill(); }
 }
 
-/// The whole run: a tick a row, a block a step, and what is in sight.
-function strip() {
-  const width = whole.clientWidth, height = whole.clientHeight;
-  const pen = fitted(whole, width, height);
+/// A step's block in the strip.
+function block(pen, index, width) {
   const x = index => index / Math.max(1, rows.length) * width;
+  const step = steps[index], from = x(rowOf(step.seq)), to = index + 1 < steps.length ? x(rowOf(steps[index + 1].seq)) : width;
+  const shade = step.failure ? "bad" : { VERIFIED: "good", CONTRADICTED: "bad" }[step.outcome] ?? "open";
+  pen.fillStyle = color(shade);
+  pen.fillRect(from, 2, Math.max(1, to - from - 1), 12);
+  if (to - from <= 14) return;
+  const { globalAlpha } = pen;
+  pen.globalAlpha = 1; pen.fillStyle = color("panel"); pen.font = "600 9px system-ui";
+  pen.fillText(String(index + 1), from + 3, 11);
+  pen.globalAlpha = globalAlpha;
+}
+
+/// What of the strip stays the same while one looks around: a tick a row, a block a step.
+let ground = null, groundOf = "";
+function groundFor(width, height) {
+  const key = `${width} ${height} ${devicePixelRatio} ${document.documentElement.dataset.theme}`;
+  if (key === groundOf) return ground;
+  ground = make("canvas");
+  groundOf = key;
+  const pen = fitted(ground, width, height);
   pen.fillStyle = color("soft"); pen.fillRect(0, 18, width, height - 18);
-  pen.fillStyle = color("pick");
-  pen.fillRect(x(lanes.scrollTop / HEIGHT), 18, Math.max(2, x(lanes.clientHeight / HEIGHT)), height - 18);
   pen.fillStyle = color("lane");
   const stride = Math.max(1, Math.floor(rows.length / (2 * width)));
   for (let index = 0; index < rows.length; index += stride) {
     const lane = laneOf.get(rows[index].to);
-    pen.fillRect(x(index), 19 + lane / actors.length * (height - 20), Math.max(1, x(1) - .5), 1.5);
+    pen.fillRect(index / rows.length * width, 19 + lane / actors.length * (height - 20), Math.max(1, width / rows.length - .5), 1.5);
   }
-  const shades = { VERIFIED: color("good"), CONTRADICTED: color("bad") };
-  steps.forEach((step, index) => {
-    const from = x(rowOf(step.seq)), to = index + 1 < steps.length ? x(rowOf(steps[index + 1].seq)) : width;
-    pen.globalAlpha = index === stepOf(rows[picked]?.seq ?? 0) ? 1 : .45;
-    pen.fillStyle = step.failure ? color("bad") : shades[step.outcome] ?? color("open");
-    pen.fillRect(from, 2, Math.max(1, to - from - 1), 12);
-    if (to - from > 14) { pen.globalAlpha = 1; pen.fillStyle = color("panel"); pen.font = "600 9px system-ui"; pen.fillText(String(index + 1), from + 3, 11); }
-  });
-  pen.globalAlpha = 1; pen.fillStyle = color("mark"); pen.fillRect(x(picked) - 1, 0, 2, height);
+  pen.globalAlpha = .45;
+  steps.forEach((_, index) => block(pen, index, width));
+  return ground;
+}
+
+/// The whole run, what of it is in sight, and what is picked.
+function strip() {
+  const width = whole.clientWidth, height = whole.clientHeight;
+  if (!width || !rows.length) return;
+  const pen = fitted(whole, width, height);
+  const x = index => index / rows.length * width;
+  pen.drawImage(groundFor(width, height), 0, 0, width, height);
+  pen.globalAlpha = .5; pen.fillStyle = color("pick");
+  pen.fillRect(x(lanes.scrollTop / HEIGHT), 18, Math.max(2, x(lanes.clientHeight / HEIGHT)), height - 18);
+  pen.globalAlpha = 1;
+  const step = stepOf(rows[picked].seq);
+  if (step >= 0) block(pen, step, width);
+  pen.fillStyle = color("mark"); pen.fillRect(x(picked) - 1, 0, 2, height);
 }
 
 /// Brings a row into sight.

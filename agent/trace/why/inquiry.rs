@@ -4,7 +4,7 @@ use super::{Crop, How, Kind, Link, Node, Why};
 use crate::trace::{
     belief::{self, Beliefs, Change},
     decision::{self, Act, Decided, StepSpan},
-    run_file::{Entry, RunFile},
+    run_file::{Delta, Entry, RunFile},
     show,
     sight::{self, Sight},
 };
@@ -182,6 +182,7 @@ impl<'a> Answer<'a> {
         self.node(&id, Kind::Decision, Some(seq), title, lines);
         self.link(&from, &id, "decided");
         self.instruction(&id, decided);
+        self.losses(&id, seq);
         match decision {
             Decided::Act(act) => self.act(&id, seq, &act),
             Decided::Look { reason } | Decided::SubtaskDone { reason, .. } | Decided::Done { reason } => {
@@ -393,8 +394,9 @@ impl<'a> Answer<'a> {
         let header = &sight.header;
         let (width, height) = (header.intrinsics.width, header.intrinsics.height);
         let title = format!("{name} of {}, {width}x{height}", header.camera);
-        let blind: Vec<String> = sight.blindness.iter().map(|why| format!("shows nothing: {why}")).collect();
-        self.node(&name, Kind::Frame, Some(sight.seq), title, blind);
+        let mut lines: Vec<String> = sight.blindness.iter().map(|why| format!("shows nothing: {why}")).collect();
+        lines.extend(sight.same_as.map(|first| format!("bit for bit the picture of {first}")));
+        self.node(&name, Kind::Frame, Some(sight.seq), title, lines);
         self.link(id, &name, "seen in");
         let crops: Vec<Crop> = objects.iter().map(|object| self.crop(sight, *object)).collect();
         if let Some(node) = self.why.nodes.iter_mut().find(|node| node.id == name) {
@@ -423,6 +425,21 @@ impl<'a> Answer<'a> {
         let objects: BTreeSet<ObjectId> = names.filter_map(|name| name.parse().ok()).collect();
         for object in objects {
             self.entry(id, seq, object, "names");
+        }
+        let last = self.all.sights.values().filter(|sight| sight.seq < seq).max_by_key(|sight| sight.seq);
+        if let Some(last) = last {
+            self.frame(id, seq, last.header.id, &[]);
+        }
+    }
+
+    /// What memory lost before a decision.
+    fn losses(&mut self, id: &str, seq: u64) {
+        let lost = |delta: &&Delta| delta.seq < seq && ["wiped", "forgotten"].contains(&delta.change.as_str());
+        for delta in self.all.run.deltas.iter().filter(lost) {
+            let name = format!("e{}", delta.event);
+            let title = format!("memory was {}, it held {}", delta.change, decision::shortened(&delta.before));
+            self.node(&name, Kind::Change, Some(delta.seq), title, Vec::new());
+            self.link(id, &name, "memory lost");
         }
     }
 
