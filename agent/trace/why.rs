@@ -2,14 +2,18 @@
 //!
 //! | module | holds |
 //! |---|---|
-//! | [`inquiry`] | the answer put together |
+//! | [`inquiry`] | the answer put together: the decision, and what it says of itself |
+//! | [`chain`] | the causes of a message |
+//! | [`read`] | what was read of memory, what had written it, and the frames behind that |
 //! | [`text`] | the answer for a person |
 //! | [`crops`] | the pixels in question as files |
 //!
 //! The answer is one small graph, [`Why`]. What the trace does not hold stands in [`Why::lacks`]; nothing is guessed.
 
+pub mod chain;
 pub mod crops;
 pub mod inquiry;
+pub mod read;
 pub mod text;
 
 use super::{decision, run_file::RunFile};

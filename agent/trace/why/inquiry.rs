@@ -1,33 +1,28 @@
-//! Puts the answer together.
+//! Puts the answer together: the decision, and what it says of itself.
 
-use super::{Crop, How, Kind, Link, Node, Why};
+use super::{Kind, Link, Node, Why};
 use crate::trace::{
-    belief::{self, Beliefs, Change},
+    belief::Beliefs,
     decision::{self, Act, Decided, StepSpan},
-    run_file::{Delta, Entry, RunFile},
-    show,
+    run_file::{Entry, RunFile},
     sight::{self, Sight},
 };
 use acm_concept::{
     ids::{FrameId, ObjectId},
-    literal::{Belief, Evidence, Literal, Place, Term},
+    literal::{Belief, Literal, Place, Term},
 };
 use acm_memory::query::Recall;
 use acm_planner::ResolvedReference;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Most lines of the chain of causes.
-const MAX_CHAIN: usize = 12;
-/// Most changes of an object that are told beside those that something rests on.
-const MAX_CHANGES: usize = 6;
 /// Most hits of a retrieval whose entries are followed.
 const MAX_HITS: usize = 6;
 
 /// A run, ready to be asked.
 pub struct Inquiry<'a> {
-    run: &'a RunFile,
-    beliefs: Beliefs<'a>,
-    sights: BTreeMap<FrameId, Sight>,
+    pub(super) run: &'a RunFile,
+    pub(super) beliefs: Beliefs<'a>,
+    pub(super) sights: BTreeMap<FrameId, Sight>,
     steps: Vec<StepSpan>,
     /// The step of each decision to act, from 0.
     step_of: BTreeMap<u64, usize>,
@@ -74,9 +69,9 @@ impl<'a> Inquiry<'a> {
 }
 
 /// An answer while it is put together.
-struct Answer<'a> {
-    all: &'a Inquiry<'a>,
-    why: Why,
+pub(super) struct Answer<'a> {
+    pub(super) all: &'a Inquiry<'a>,
+    pub(super) why: Why,
     known: BTreeSet<String>,
 }
 
@@ -86,7 +81,7 @@ impl<'a> Answer<'a> {
     }
 
     /// Adds a node unless it is there; says whether it was new.
-    fn node(&mut self, id: &str, kind: Kind, seq: Option<u64>, title: String, lines: Vec<String>) -> bool {
+    pub(super) fn node(&mut self, id: &str, kind: Kind, seq: Option<u64>, title: String, lines: Vec<String>) -> bool {
         let new = self.known.insert(id.into());
         if new {
             let t = seq.and_then(|seq| self.all.run.entry(seq)).map(Entry::seconds);
@@ -95,79 +90,16 @@ impl<'a> Answer<'a> {
         new
     }
 
-    fn link(&mut self, from: &str, to: &str, role: &'static str) {
+    pub(super) fn link(&mut self, from: &str, to: &str, role: &'static str) {
         let link = Link { from: from.into(), to: to.into(), role };
         if !self.why.links.contains(&link) {
             self.why.links.push(link);
         }
     }
 
-    fn lack(&mut self, what: String) {
+    pub(super) fn lack(&mut self, what: String) {
         if !self.why.lacks.contains(&what) {
             self.why.lacks.push(what);
-        }
-    }
-
-    /// The causes back to the decision, or to the beginning where there is none. Gives the decision's message.
-    fn chain(&mut self, seq: u64) -> Option<&'a Entry> {
-        let mut chain: Vec<&'a Entry> = Vec::new();
-        let mut next = Some(seq);
-        while let Some(seq) = next {
-            let Some(entry) = self.all.run.entry(seq) else {
-                self.lack(format!("message {seq}, a cause, is not in the trace"));
-                break;
-            };
-            chain.push(entry);
-            if entry.header.kind == "decided" {
-                break;
-            }
-            // A cause comes before what it causes: a damaged trace must not send us round in circles.
-            next = entry.header.cause.filter(|&cause| cause < seq);
-        }
-        let decided = chain.last().copied().filter(|entry| entry.header.kind == "decided");
-        chain.reverse();
-        self.rows(&chain);
-        decided
-    }
-
-    /// The chain as nodes, the latest first; long series are one node.
-    fn rows(&mut self, chain: &[&'a Entry]) {
-        let (mut groups, mut at) = (Vec::new(), 0);
-        while at < chain.len() {
-            let length = show::series(chain.get(at..).unwrap_or_default());
-            let length = if length < show::FOLD_FROM { 1 } else { length };
-            groups.extend(chain.get(at..at + length));
-            at += length;
-        }
-        let older = groups.len().saturating_sub(MAX_CHAIN);
-        let mut before: Option<String> = None;
-        let mut add = |answer: &mut Self, group: &[&Entry], words: Option<String>| {
-            let (Some(first), Some(last)) = (group.first(), group.last()) else { return };
-            let header = &last.header;
-            let id = format!("m{}", header.seq);
-            let title =
-                words.unwrap_or_else(|| format!("{} > {}  {}  {}", header.from, header.to, header.kind, last.line));
-            let (kind, seq) = match first.header.seq == header.seq {
-                true => (Kind::Message, header.seq),
-                false => (Kind::Messages, first.header.seq),
-            };
-            answer.node(&id, kind, Some(seq), title, Vec::new());
-            if let Some(before) = before.replace(id.clone()) {
-                answer.link(&before, &id, "caused by");
-            }
-        };
-        for group in groups.iter().skip(older).rev() {
-            let words = group.get(1).zip(group.last()).map(|(second, last)| {
-                let kinds = format!("{}, {}", last.header.kind, second.header.kind);
-                format!("{} messages up to {} ({kinds}); {}", group.len(), last.header.seq, last.line)
-            });
-            add(self, group, words);
-        }
-        if let (Some([first, ..]), true) = (groups.first(), older > 0) {
-            let count: usize = groups.iter().take(older).map(|group| group.len()).sum();
-            let words = format!("{count} messages before that, back to message {}", first.header.seq);
-            let both = [*first, groups.get(older - 1).and_then(|group| group.last()).unwrap_or(first)];
-            add(self, &both, Some(words));
         }
     }
 
@@ -295,130 +227,6 @@ impl<'a> Answer<'a> {
         self.evidence(name, seq, &objects, &belief.evidence);
     }
 
-    /// What something rests on: frames and own moves are followed, conclusions stand in the words already.
-    fn evidence(&mut self, id: &str, seq: u64, objects: &[ObjectId], evidence: &[Evidence]) {
-        let all = self.all;
-        for one in evidence {
-            match one {
-                Evidence::Frame(frame) => {
-                    self.frame(id, seq, *frame, objects);
-                    for &object in objects {
-                        self.written_from(id, seq, object, *frame);
-                    }
-                }
-                Evidence::Transition(transition) => match all.beliefs.transition(*transition, seq) {
-                    Some((object, change)) => self.change(id, object, change),
-                    None => {
-                        self.lack(format!("own move {transition} is not in this trace: it was made in an earlier run"))
-                    }
-                },
-                Evidence::Inferred(_) => {}
-            }
-        }
-    }
-
-    /// The changes of an object that a frame brought about.
-    fn written_from(&mut self, id: &str, seq: u64, object: ObjectId, frame: FrameId) {
-        let all = self.all;
-        for change in all.beliefs.before(object, seq) {
-            if change.words.is_some() && change.frames().any(|of| of == frame) {
-                self.change(id, object, change);
-            }
-        }
-    }
-
-    /// An entry of memory as it was just before a message, with what made it so.
-    fn entry(&mut self, id: &str, seq: u64, object: ObjectId, role: &'static str) {
-        let name = object.to_string();
-        let believed = self.all.beliefs.at(object, seq);
-        let words = believed.map(belief::entry_words).or_else(|| self.in_view(object, seq));
-        let title = format!("{name} {}", words.as_deref().unwrap_or("(not in the trace)"));
-        let new = self.node(&name, Kind::Entry, Some(seq), title, Vec::new());
-        self.link(id, &name, role);
-        if !new {
-            return;
-        }
-        if self.all.beliefs.inherited(object) {
-            self.lack(format!(
-                "{name} was in memory before this trace began: what wrote it first, and frames of then, are not in it"
-            ));
-        }
-        let changes = self.all.beliefs.before(object, seq);
-        // Its history repeats what the entry says; it is told where something rests on it.
-        let told = changes.iter().filter(|change| change.words.is_some() && change.delta.change != "history");
-        let told: Vec<&Change<'_>> = told.collect();
-        let left_out = told.len().saturating_sub(MAX_CHANGES);
-        // The first one says where it came from, the last ones why it is as it is.
-        let kept = told.iter().enumerate().filter(|(index, _)| *index == 0 || *index > left_out);
-        let kept: Vec<Change<'_>> = kept.map(|(_, change)| (*change).clone()).collect();
-        for change in &kept {
-            self.change(&name, object, change);
-        }
-        if left_out > 0 {
-            let node = self.why.nodes.iter_mut().find(|node| node.id == name);
-            node.into_iter().for_each(|node| node.lines.push(format!("{left_out} changes between are left out")));
-        }
-    }
-
-    /// An object in the view that the planner was given, for one that no change of this trace concerns.
-    fn in_view(&self, object: ObjectId, seq: u64) -> Option<String> {
-        let cause = self.all.run.entry(seq)?.header.cause?;
-        let body = self.all.run.entry(cause)?.record().ok()?.body;
-        let objects = body.get("view")?.get("objects")?.as_array()?;
-        let name = object.to_string();
-        let entry = objects.iter().find(|entry| entry.get("id").and_then(|id| id.as_str()) == Some(&*name))?;
-        Some(belief::entry_words(entry))
-    }
-
-    fn change(&mut self, id: &str, object: ObjectId, change: &Change<'_>) {
-        let delta = change.delta;
-        let name = format!("e{}", delta.event);
-        let words = change.words.clone().unwrap_or_else(|| format!("{object} was seen again where it was"));
-        let evidence: Vec<String> = delta.evidence.iter().map(decision::evidence_words).collect();
-        let lines = if evidence.is_empty() { Vec::new() } else { vec![format!("by {}", evidence.join(" and "))] };
-        self.node(&name, Kind::Change, Some(delta.seq), words, lines);
-        self.link(id, &name, "written by");
-        for frame in change.frames() {
-            self.frame(&name, delta.seq + 1, frame, &[object]);
-        }
-    }
-
-    /// A frame, with the pixels of the objects for which it is evidence.
-    fn frame(&mut self, id: &str, seq: u64, frame: FrameId, objects: &[ObjectId]) {
-        let name = frame.to_string();
-        // Numbers of frames begin anew with each run: one from after the message is a namesake.
-        let Some(sight) = self.all.sights.get(&frame).filter(|sight| sight.seq < seq) else {
-            return self
-                .lack(format!("frame {name} is not in this trace before message {seq}: it is of an earlier run"));
-        };
-        let header = &sight.header;
-        let (width, height) = (header.intrinsics.width, header.intrinsics.height);
-        let title = format!("{name} of {}, {width}x{height}", header.camera);
-        let mut lines: Vec<String> = sight.blindness.iter().map(|why| format!("shows nothing: {why}")).collect();
-        lines.extend(sight.same_as.map(|first| format!("bit for bit the picture of {first}")));
-        self.node(&name, Kind::Frame, Some(sight.seq), title, lines);
-        self.link(id, &name, "seen in");
-        let crops: Vec<Crop> = objects.iter().map(|object| self.crop(sight, *object)).collect();
-        if let Some(node) = self.why.nodes.iter_mut().find(|node| node.id == name) {
-            for crop in crops {
-                if !node.crops.contains(&crop) {
-                    node.crops.push(crop);
-                }
-            }
-        }
-    }
-
-    fn crop(&self, sight: &Sight, object: ObjectId) -> Crop {
-        let crop = |bounds, how, label| Crop { frame: sight.header.id, object, bounds, how, label, file: None };
-        if let Some(seen) = sight.of(object) {
-            let label = format!("{} {:.2}", seen.category, seen.confidence);
-            return crop(Some(seen.bounds), How::Seen, label);
-        }
-        let believed = self.all.beliefs.at(object, sight.seq).and_then(belief::place);
-        let label = sight.visibility(object).map_or("not seen, and not expected", sight::visibility_word);
-        crop(believed.and_then(|place| sight.around(place)), How::Projected, label.into())
-    }
-
     /// A decision that explains itself in words alone: what the words name.
     fn named(&mut self, id: &str, seq: u64, words: &str) {
         let names = words.split(|sign: char| !sign.is_ascii_alphanumeric());
@@ -429,17 +237,6 @@ impl<'a> Answer<'a> {
         let last = self.all.sights.values().filter(|sight| sight.seq < seq).max_by_key(|sight| sight.seq);
         if let Some(last) = last {
             self.frame(id, seq, last.header.id, &[]);
-        }
-    }
-
-    /// What memory lost before a decision.
-    fn losses(&mut self, id: &str, seq: u64) {
-        let lost = |delta: &&Delta| delta.seq < seq && ["wiped", "forgotten"].contains(&delta.change.as_str());
-        for delta in self.all.run.deltas.iter().filter(lost) {
-            let name = format!("e{}", delta.event);
-            let title = format!("memory was {}, it held {}", delta.change, decision::shortened(&delta.before));
-            self.node(&name, Kind::Change, Some(delta.seq), title, Vec::new());
-            self.link(id, &name, "memory lost");
         }
     }
 
@@ -464,29 +261,6 @@ impl<'a> Answer<'a> {
         for literal in &verdict.literals {
             let objects = objects_of(&literal.literal);
             self.evidence(&name, span.last_seq(run) + 1, &objects, &literal.observed.evidence);
-        }
-    }
-
-    /// What the handling of the message itself changed in memory.
-    fn written_by(&mut self, seq: u64) {
-        let id = format!("m{seq}");
-        let objects: BTreeSet<ObjectId> = self
-            .all
-            .run
-            .deltas
-            .iter()
-            .filter(|delta| delta.seq == seq)
-            .filter_map(|delta| delta.object.as_deref()?.parse().ok())
-            .collect();
-        for object in objects {
-            let changes =
-                self.all.beliefs.before(object, seq + 1).iter().filter(|c| c.delta.seq == seq && c.words.is_some());
-            let changes: Vec<Change<'_>> = changes.cloned().collect();
-            for change in &changes {
-                self.change(&id, object, change);
-                let written = self.why.links.iter_mut().rev().find(|link| link.from == id && link.role == "written by");
-                written.into_iter().for_each(|link| link.role = "changed");
-            }
         }
     }
 }
