@@ -1,6 +1,8 @@
 //! The command line and its exit codes.
 
-use crate::{bench, bench::world::WorldPart, demo, doctor, inject::Injection, perceive, run, scenario, serve, trace};
+pub mod trace;
+
+use crate::{bench, bench::world::WorldPart, demo, doctor, inject::Injection, perceive, run, scenario, serve};
 use acm_actors::{
     AgentError,
     episode::Until,
@@ -71,7 +73,7 @@ pub enum Command {
     Sim(SimCommand),
     /// Look into the traces that `acm run --trace` writes.
     #[command(subcommand)]
-    Trace(TraceCommand),
+    Trace(trace::TraceCommand),
     /// Measure figures and print them beside what they are to reach.
     #[command(subcommand)]
     Bench(BenchCommand),
@@ -347,110 +349,6 @@ pub fn exit_of_error(error: &anyhow::Error) -> Exit {
     }
 }
 
-/// The verbs of `acm trace`.
-#[derive(Debug, Subcommand)]
-pub enum TraceCommand {
-    /// One line for each run in a folder: what was run, and how it ended.
-    Ls(TraceLsArgs),
-    /// The messages of a run as a table; or one step's decision; or one message in full.
-    Show(TraceShowArgs),
-    /// Where two runs part: the first record that differs, its fields, and memory there. Exit 0 equal, 1 different, 2
-    /// unusable.
-    Diff(TraceDiffArgs),
-    /// Hold a run against rules, for tests. Exit 0 kept, 1 broken, 2 unusable.
-    Check(TraceCheckArgs),
-    /// Run a recorded run again and compare it message by message. Exit 0 identical, 1 diverged, 2 unusable.
-    Replay(TraceReplayArgs),
-    /// Make a whole file of what is left of a cut one.
-    Repair(TraceRepairArgs),
-}
-
-/// Arguments of `acm trace diff`.
-#[derive(Debug, Args)]
-pub struct TraceDiffArgs {
-    /// A trace.
-    pub a: PathBuf,
-    /// Another one.
-    pub b: PathBuf,
-    /// Print JSON instead of text: null if they are equal.
-    #[arg(long)]
-    pub json: bool,
-}
-
-/// Arguments of `acm trace check`.
-#[derive(Debug, Args)]
-pub struct TraceCheckArgs {
-    /// The trace.
-    pub file: PathBuf,
-    /// The rules, a TOML file (docs/trace.md).
-    pub rules: PathBuf,
-    /// Print JSON instead of text.
-    #[arg(long)]
-    pub json: bool,
-}
-
-/// Arguments of `acm trace replay`.
-#[derive(Debug, Args)]
-pub struct TraceReplayArgs {
-    /// The trace.
-    pub file: PathBuf,
-    /// Run physics and renderer again too, instead of taking what they gave from the trace.
-    #[arg(long)]
-    pub resim: bool,
-    /// Stop after the message of this number.
-    #[arg(long, value_name = "N")]
-    pub until: Option<u64>,
-    /// Print each message, and wait for Enter before it is handled; `q` ends.
-    #[arg(long)]
-    pub step: bool,
-}
-
-/// Arguments of `acm trace repair`.
-#[derive(Debug, Args)]
-pub struct TraceRepairArgs {
-    /// The cut trace. It is left as it is.
-    pub file: PathBuf,
-    /// The whole file; FILE-repaired.mcap beside it if absent.
-    #[arg(long, value_name = "FILE")]
-    pub out: Option<PathBuf>,
-}
-
-/// Arguments of `acm trace ls`.
-#[derive(Debug, Args)]
-pub struct TraceLsArgs {
-    /// A folder with traces, or one trace.
-    #[arg(default_value = ".")]
-    pub path: PathBuf,
-    /// Print JSON instead of text.
-    #[arg(long)]
-    pub json: bool,
-}
-
-/// Arguments of `acm trace show`.
-#[derive(Debug, Args)]
-pub struct TraceShowArgs {
-    /// The trace.
-    pub file: PathBuf,
-    /// The decision behind the Nth skill that was run: candidates, preconditions, prediction, verdict.
-    #[arg(long, value_name = "N", conflicts_with_all = ["seq", "json"])]
-    pub step: Option<usize>,
-    /// The message of this number, in full.
-    #[arg(long, value_name = "N")]
-    pub seq: Option<u64>,
-    /// Only messages from or to this actor.
-    #[arg(long, value_name = "A")]
-    pub actor: Option<String>,
-    /// Only messages of this kind.
-    #[arg(long, value_name = "K")]
-    pub kind: Option<String>,
-    /// Only messages whose line or body has this word, small or capital.
-    #[arg(long, value_name = "WORD")]
-    pub text: Option<String>,
-    /// Print JSON instead of text: the messages in full.
-    #[arg(long)]
-    pub json: bool,
-}
-
 /// The benches.
 #[derive(Debug, Subcommand)]
 pub enum BenchCommand {
@@ -507,7 +405,7 @@ pub fn run(cli: Cli) -> anyhow::Result<Exit> {
         Command::Perceive(args) => perceive::run(&args),
         Command::Scenario(command) => scenario::run(&command),
         Command::Sim(SimCommand::Serve(args)) => serve::run(&args),
-        Command::Trace(command) => trace::run(&command),
+        Command::Trace(command) => crate::trace::run(&command),
         Command::Bench(command) => bench::run(&command),
         Command::BenchReader(args) => bench::runtime::peer::run(&args),
         Command::Doctor => doctor::run(),

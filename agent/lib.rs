@@ -15,6 +15,7 @@
 //! | [`scenario`], [`doctor`] | `acm scenario`, `acm doctor` |
 //! | [`trace`] | `acm trace`: a run written down, and looked into |
 //! | [`video`] | `acm run --video`: an episode as moving pictures |
+//! | [`embed`] | what the pages of `acm demo` and `acm trace` have in common |
 //! | [`words`] | words for what memory holds |
 //! | [`statistics`] | proportions with intervals |
 
@@ -22,6 +23,7 @@ pub mod bench;
 pub mod cli;
 pub mod demo;
 pub mod doctor;
+pub mod embed;
 pub mod episode;
 pub mod inject;
 pub mod narrate;

@@ -12,19 +12,33 @@
 //! | [`recorded`] | a trace read for being run again |
 //! | [`replay`] | `acm trace replay`: a recorded run once more, compared message by message |
 //! | [`repair`] | `acm trace repair`: what is left of a cut file as a whole one |
+//! | [`belief`] | what memory believed of each object, and the changes by which it came to that |
+//! | [`sight`] | what the cameras saw, and what was made of it |
+//! | [`picture`] | the pictures of a trace |
+//! | [`why`] | `acm trace why`: from a message back to the frames on which it rests |
+//! | [`export`] | `acm trace export`: other tools' forms |
+//! | [`page`] | the viewer as one HTML page |
+//! | [`view`] | `acm trace view`: the viewer on this machine |
 
+pub mod belief;
 pub mod check;
 pub mod decision;
 pub mod diff;
+pub mod export;
 pub mod list;
+pub mod page;
+pub mod picture;
 pub mod recorded;
 pub mod recording;
 pub mod repair;
 pub mod replay;
 pub mod run_file;
 pub mod show;
+pub mod sight;
+pub mod view;
+pub mod why;
 
-use crate::cli::{Exit, TraceCommand};
+use crate::cli::{Exit, trace::TraceCommand};
 
 /// Runs `acm trace`.
 pub fn run(command: &TraceCommand) -> anyhow::Result<Exit> {
@@ -35,5 +49,8 @@ pub fn run(command: &TraceCommand) -> anyhow::Result<Exit> {
         TraceCommand::Check(args) => check::run(args),
         TraceCommand::Replay(args) => replay::run(args),
         TraceCommand::Repair(args) => repair::run(args),
+        TraceCommand::Why(args) => why::run(args),
+        TraceCommand::Export(args) => export::run(args),
+        TraceCommand::View(args) => view::run(args),
     }
 }

@@ -1,8 +1,14 @@
 //! The real binary on bad input: one clear line and exit code 2, nothing lost.
 #![allow(clippy::unwrap_used, clippy::expect_used)] // a failed unwrap is the test's verdict
 
+#[path = "command_line/chromium.rs"]
+mod chromium;
 #[path = "command_line/demo.rs"]
 mod demo;
+#[path = "command_line/export.rs"]
+mod export;
+#[path = "command_line/long.rs"]
+mod long;
 #[path = "command_line/perceive.rs"]
 mod perceive;
 #[path = "command_line/real_frames.rs"]
@@ -11,6 +17,10 @@ mod real_frames;
 mod synthetic;
 #[path = "command_line/trace.rs"]
 mod trace;
+#[path = "command_line/viewer.rs"]
+mod viewer;
+#[path = "command_line/why.rs"]
+mod why;
 
 use assert_cmd::Command;
 use std::{fs, path::Path};

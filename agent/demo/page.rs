@@ -1,6 +1,7 @@
 //! The demo as an HTML page: one file that asks for nothing from outside.
 
 use super::reel::{Chapter, ObjectRow, Reel, Step};
+use crate::embed;
 use acm_concept::ids::{FrameId, ObjectId};
 use anyhow::Context;
 use image::{RgbImage, codecs::jpeg::JpegEncoder};
@@ -12,8 +13,6 @@ use std::{
 
 /// The page without its data.
 const TEMPLATE: &str = include_str!("page.html");
-/// Where the data goes.
-const DATA: &str = "{{DATA}}";
 /// JPEG quality of steps and of cut-outs, 0-100.
 const QUALITY: u8 = 80;
 /// Largest page, bytes.
@@ -141,8 +140,7 @@ impl Page {
     /// It would be too large.
     pub fn html(&self) -> anyhow::Result<String> {
         let json = serde_json::to_string(self)?;
-        // Nothing in the data may end the element that holds it.
-        let html = TEMPLATE.replace(DATA, &json.replace('<', "\\u003c").replace('>', "\\u003e"));
+        let html = embed::fill(TEMPLATE, &json);
         anyhow::ensure!(html.len() <= MAX_BYTES, "the page has {} bytes, more than {MAX_BYTES}", html.len());
         Ok(html)
     }
@@ -176,34 +174,13 @@ fn picture(image: &RgbImage) -> String {
     let mut bytes = Vec::new();
     let encoded = JpegEncoder::new_with_quality(&mut bytes, QUALITY).encode_image(image);
     // Writing to memory fails for an empty picture alone.
-    encoded.map_or_else(|_empty| String::new(), |()| format!("data:image/jpeg;base64,{}", base64(&bytes)))
-}
-
-fn base64(bytes: &[u8]) -> String {
-    const SIGNS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
-    for three in bytes.chunks(3) {
-        let byte = |index: usize| u32::from(three.get(index).copied().unwrap_or(0));
-        let bits = byte(0) << 16 | byte(1) << 8 | byte(2);
-        for place in 0..4 {
-            let sign = SIGNS[(bits >> (18 - 6 * place) & 63) as usize];
-            text.push(if place > three.len() { '=' } else { char::from(sign) });
-        }
-    }
-    text
+    encoded.map_or_else(|_empty| String::new(), |()| embed::data_uri("image/jpeg", &bytes))
 }
 
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used, reason = "a failed unwrap is the test's verdict")]
     use super::*;
-
-    #[test]
-    fn base64_is_as_in_its_standard() {
-        for (plain, coded) in [("", ""), ("f", "Zg=="), ("fo", "Zm8="), ("foo", "Zm9v"), ("foobar", "Zm9vYmFy")] {
-            assert_eq!(base64(plain.as_bytes()), coded);
-        }
-    }
 
     #[test]
     fn a_page_asks_for_nothing_and_its_text_cannot_break_out() {

@@ -1,7 +1,7 @@
 //! `acm trace check`: rules that a run must keep, for tests that outlive the run.
 
 use super::run_file::{Entry, RunFile};
-use crate::cli::{Exit, TraceCheckArgs};
+use crate::cli::{Exit, trace::TraceCheckArgs};
 use anyhow::{Context, bail};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;

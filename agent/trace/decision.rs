@@ -9,7 +9,7 @@ use acm_memory::{
     observation::{Outcome, Verdict},
     query::Recall,
 };
-use acm_planner::{Explanation, ResolvedReference, Step};
+use acm_planner::{Explanation, ResolvedReference, Step, Unknown};
 use anyhow::bail;
 use serde::{Deserialize, de::DeserializeOwned};
 use std::io::{self, Write};
@@ -37,6 +37,26 @@ pub fn steps(run: &RunFile) -> Vec<StepSpan> {
 }
 
 impl StepSpan {
+    /// The message with the decision.
+    pub fn decision<'a>(&self, run: &'a RunFile) -> Option<&'a Entry> {
+        run.entries.get(self.first)
+    }
+
+    /// The last message before the next decision to act.
+    pub fn last_seq(&self, run: &RunFile) -> u64 {
+        self.entries(run).last().map_or(0, |entry| entry.header.seq)
+    }
+
+    /// What the verifier found in the end.
+    pub fn verdict(&self, run: &RunFile) -> Option<Verdict> {
+        self.last(run, "verdict", Some("verdict"))
+    }
+
+    /// The executor's report.
+    pub fn report(&self, run: &RunFile) -> Option<SkillReport> {
+        self.last(run, "skill-ended", None)
+    }
+
     fn entries<'a>(&self, run: &'a RunFile) -> &'a [Entry] {
         run.entries.get(self.first..self.end).unwrap_or_default()
     }
@@ -54,24 +74,63 @@ impl StepSpan {
 
     /// Why the step failed, if it did: what the controller said, else what the verifier found.
     pub fn failure(&self, run: &RunFile) -> Option<String> {
-        let report: Option<SkillReport> = self.last(run, "skill-ended", None);
-        if let Some((cause, reason)) = report.and_then(|report| report.failure) {
+        if let Some((cause, reason)) = self.report(run).and_then(|report| report.failure) {
             return Some(format!("{}: {reason}", cause.word()));
         }
-        let verdict: Verdict = self.last(run, "verdict", Some("verdict"))?;
+        let verdict = self.verdict(run)?;
         (verdict.outcome == Outcome::Contradicted).then_some(verdict.reason)
     }
 }
 
-#[derive(Deserialize)]
-struct Act {
-    step: Step,
-    explanation: Explanation,
+/// A decision read back.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Decided {
+    /// Run a skill.
+    Act(Box<Act>),
+    /// Observe again.
+    Look {
+        /// What the look is for.
+        reason: String,
+    },
+    /// A subtask is done.
+    SubtaskDone {
+        /// Its index, from 0.
+        index: u32,
+        /// Why it counts as done.
+        reason: String,
+    },
+    /// All is done.
+    Done {
+        /// Why it counts as done.
+        reason: String,
+    },
+    /// Nothing honest is left to do.
+    GiveUp {
+        /// What is not known or not possible.
+        unknown: Unknown,
+    },
 }
 
-#[derive(Deserialize)]
-struct Decision {
-    act: Act,
+/// The decision to run a skill.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct Act {
+    /// The skill.
+    pub step: Step,
+    /// Why this one.
+    pub explanation: Explanation,
+}
+
+impl Decided {
+    /// The decision in a message of the kind `decided`.
+    ///
+    /// # Errors
+    /// The message has another form.
+    pub fn read(entry: &Entry) -> anyhow::Result<Decided> {
+        let decision = entry.record()?.body.get_mut("decision").map(serde_json::Value::take).unwrap_or_default();
+        serde_json::from_value(decision)
+            .map_err(|e| anyhow::anyhow!("the decision of message {} cannot be read: {e}", entry.header.seq))
+    }
 }
 
 /// Prints the decision behind the nth step (from 1).
@@ -82,12 +141,8 @@ pub fn show(run: &RunFile, number: usize, out: &mut impl Write) -> anyhow::Resul
     };
     let entries = span.entries(run);
     let Some(first) = entries.first() else { bail!("step {number} is empty") };
-    let body = first.record()?.body;
-    let decision = body.get("decision").cloned().unwrap_or_default();
-    let Decision { act } = serde_json::from_value(decision).map_err(|e| {
-        anyhow::anyhow!("the decision of step {number} (message {}) cannot be read: {e}", first.header.seq)
-    })?;
-    let Act { step, explanation } = act;
+    let Decided::Act(act) = Decided::read(first)? else { bail!("step {number} is no decision to act") };
+    let Act { step, explanation } = *act;
     writeln!(
         out,
         "step {number} of {}: {step}   t {:.2} s, message {}",
@@ -166,7 +221,7 @@ fn reference_lines(reference: &ResolvedReference, out: &mut impl Write) -> io::R
 }
 
 fn outcome(span: &StepSpan, run: &RunFile, out: &mut impl Write) -> io::Result<()> {
-    match span.last::<SkillReport>(run, "skill-ended", None) {
+    match span.report(run) {
         Some(report) => {
             let primitives: Vec<String> = report.primitives.iter().map(|p| p.primitive.to_string()).collect();
             let ended = match &report.failure {
@@ -180,7 +235,7 @@ fn outcome(span: &StepSpan, run: &RunFile, out: &mut impl Write) -> io::Result<(
         }
         None => writeln!(out, "{:<14}the trace does not have the end of this skill", "ran")?,
     }
-    let Some(verdict) = span.last::<Verdict>(run, "verdict", Some("verdict")) else {
+    let Some(verdict) = span.verdict(run) else {
         return writeln!(out, "{:<14}none in the trace", "verdict");
     };
     writeln!(out, "{:<14}{}: {}", "verdict", outcome_word(verdict.outcome), verdict.reason)?;
@@ -236,7 +291,7 @@ pub fn delta_words(delta: &Delta) -> Option<String> {
 }
 
 /// A value with its numbers rounded to what a person reads.
-fn shortened(value: &serde_json::Value) -> String {
+pub fn shortened(value: &serde_json::Value) -> String {
     use serde_json::Value;
     match value {
         Value::Number(number) if number.is_f64() => format!("{:.3}", number.as_f64().unwrap_or(0.0) + 0.0),
@@ -257,7 +312,8 @@ fn section(out: &mut impl Write, title: &str, lines: impl Iterator<Item = String
     Ok(())
 }
 
-fn belief_words((literal, belief): &(Literal, Belief)) -> String {
+/// A literal with what is believed of it.
+pub fn belief_words((literal, belief): &(Literal, Belief)) -> String {
     let truth = match belief.truth {
         Truth::Yes => "holds",
         Truth::No => "DOES NOT HOLD",
@@ -266,7 +322,8 @@ fn belief_words((literal, belief): &(Literal, Belief)) -> String {
     format!("{literal}  {truth} {:.2}: {}", belief.confidence, belief.reason)
 }
 
-fn evidence_words(evidence: &Evidence) -> String {
+/// What a belief rests on, in words.
+pub fn evidence_words(evidence: &Evidence) -> String {
     match evidence {
         Evidence::Frame(frame) => format!("frame {frame}"),
         Evidence::Transition(transition) => format!("own move {transition}"),
@@ -274,7 +331,8 @@ fn evidence_words(evidence: &Evidence) -> String {
     }
 }
 
-fn outcome_word(outcome: Outcome) -> &'static str {
+/// The word for what a verifier found.
+pub fn outcome_word(outcome: Outcome) -> &'static str {
     match outcome {
         Outcome::Verified => "VERIFIED",
         Outcome::Contradicted => "CONTRADICTED",

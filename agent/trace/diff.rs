@@ -4,7 +4,7 @@
 //! the attachments. The first pair that differs is told, field by field, with what memory had become in each.
 
 use super::run_file::{Entry, RunFile};
-use crate::cli::{Exit, TraceDiffArgs};
+use crate::cli::{Exit, trace::TraceDiffArgs};
 use acm_runtime::trace::{Item, TraceReader, reader::TraceMessage, record};
 use serde::Serialize;
 use serde_json::Value;

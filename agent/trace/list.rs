@@ -1,7 +1,7 @@
 //! `acm trace ls`: one line a run.
 
 use super::{decision, run_file::RunFile};
-use crate::cli::{Exit, TraceLsArgs};
+use crate::cli::{Exit, trace::TraceLsArgs};
 use anyhow::{Context, bail};
 use serde::Serialize;
 use std::{

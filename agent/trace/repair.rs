@@ -1,6 +1,6 @@
 //! `acm trace repair`: what is left of a cut trace as a whole file.
 
-use crate::cli::{Exit, TraceRepairArgs};
+use crate::cli::{Exit, trace::TraceRepairArgs};
 use acm_runtime::trace::{Item, TraceOptions, TraceReader, TraceWriter};
 use anyhow::bail;
 use std::path::{Path, PathBuf};

@@ -8,7 +8,7 @@ use super::{
     recorded::Recorded,
 };
 use crate::{
-    cli::{Exit, RunArgs, TraceReplayArgs},
+    cli::{Exit, RunArgs, trace::TraceReplayArgs},
     episode::{EpisodeConfig, Runner},
     inject::Faults,
     run::prepare,

@@ -2,7 +2,9 @@
 
 use super::recording::{RESULT, RUN};
 use acm_actors::trace::viewer;
+use acm_concept::literal::Evidence;
 use acm_runtime::trace::{Item, Record, TraceReader, reader::TraceMessage, record};
+use anyhow::Context;
 use serde::{Deserialize, Serialize};
 use std::{collections::BTreeMap, path::Path};
 
@@ -61,6 +63,10 @@ impl Entry {
 pub struct Delta {
     /// The message whose handling changed memory.
     pub seq: u64,
+    /// Number of the event since memory was opened, from 1.
+    pub event: u64,
+    /// What the change rests on.
+    pub evidence: Vec<Evidence>,
     /// Kind of event.
     pub change: String,
     /// The object concerned.
@@ -69,6 +75,17 @@ pub struct Delta {
     pub before: serde_json::Value,
     /// What is believed from now on.
     pub after: serde_json::Value,
+}
+
+/// Something that came from outside: a frame, a random draw, a model's reply.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Effect {
+    /// What came: the end of its topic, such as `frame`.
+    pub kind: String,
+    /// The message whose handling asked for it.
+    pub seq: u64,
+    /// The record.
+    pub record: serde_json::Value,
 }
 
 /// A trace as far as it could be read.
@@ -82,6 +99,8 @@ pub struct RunFile {
     pub entries: Vec<Entry>,
     /// Changes of memory, in order.
     pub deltas: Vec<Delta>,
+    /// What came from outside, in order.
+    pub effects: Vec<Effect>,
     /// Size of the file.
     pub bytes: u64,
     /// Messages on all channels.
@@ -113,6 +132,7 @@ impl RunFile {
             }
         }
         run.cut = run.cut.or_else(|| reader.cut().map(str::to_owned));
+        run.entries.sort_by_key(|entry| entry.header.seq);
         for entry in &mut run.entries {
             entry.line = lines.remove(&entry.header.seq).unwrap_or_default();
         }
@@ -124,6 +144,7 @@ impl RunFile {
         match message.channel.schema.as_str() {
             record::NAME => self.entries.extend(Entry::parse(message.data)),
             "acm.MemoryDelta" => self.deltas.extend(serde_json::from_slice::<Delta>(&message.data)),
+            "acm.Effect" => self.effects.extend(effect(&message)),
             "foxglove.Log" => lines.extend(viewer::read_line(&message.data)),
             _ => {}
         }
@@ -136,7 +157,17 @@ impl RunFile {
 
     /// The message of a number.
     pub fn entry(&self, seq: u64) -> Option<&Entry> {
-        self.entries.iter().find(|entry| entry.header.seq == seq)
+        self.entries.get(self.entries.binary_search_by_key(&seq, |entry| entry.header.seq).ok()?)
+    }
+
+    /// The message of a number, which somebody asked for.
+    pub fn asked(&self, seq: u64) -> anyhow::Result<&Entry> {
+        self.entry(seq).with_context(|| match (self.entries.first(), self.entries.last()) {
+            (Some(first), Some(last)) => {
+                format!("there is no message {seq}: the trace has {} to {}", first.header.seq, last.header.seq)
+            }
+            _ => format!("there is no message {seq}: the trace has no message"),
+        })
     }
 
     /// How the run ended: what the result says, else what the last message shows.
@@ -157,4 +188,10 @@ impl RunFile {
             None => "no message".into(),
         }
     }
+}
+
+fn effect(message: &TraceMessage) -> Option<Effect> {
+    let record: serde_json::Value = serde_json::from_slice(&message.data).ok()?;
+    let kind = message.topic().rsplit('/').next().unwrap_or_default().to_owned();
+    Some(Effect { kind, seq: record.get("seq")?.as_u64()?, record })
 }

@@ -4,7 +4,7 @@ use super::{
     decision,
     run_file::{Entry, RunFile},
 };
-use crate::cli::{Exit, TraceShowArgs};
+use crate::cli::{Exit, trace::TraceShowArgs};
 use anyhow::bail;
 use std::{
     collections::BTreeSet,
@@ -14,7 +14,7 @@ use std::{
 /// Width of the table, columns.
 const WIDTH: usize = 100;
 /// From this length on, a series of two messages that take turns is one line.
-const FOLD_FROM: usize = 8;
+pub(super) const FOLD_FROM: usize = 8;
 
 /// Runs `acm trace show`.
 pub fn run(args: &TraceShowArgs) -> anyhow::Result<Exit> {
@@ -102,7 +102,7 @@ fn table(entries: &[&Entry], out: &mut impl Write) -> io::Result<()> {
 }
 
 /// How many entries from the first one on follow each other and take turns in two forms.
-fn series(entries: &[&Entry]) -> usize {
+pub(super) fn series(entries: &[&Entry]) -> usize {
     let form = |entry: &Entry| (entry.header.from.clone(), entry.header.to.clone(), entry.header.kind.clone());
     let follows = |at: usize| match (entries.get(at.wrapping_sub(1)), entries.get(at)) {
         (Some(before), Some(entry)) => entry.header.seq == before.header.seq + 1,
@@ -159,14 +159,7 @@ fn fitted(text: &str) -> String {
 
 /// One message in full, with what it changed in memory.
 fn one(run: &RunFile, seq: u64, json: bool, out: &mut impl Write) -> anyhow::Result<()> {
-    let Some(entry) = run.entry(seq) else {
-        let ends = run.entries.first().zip(run.entries.last());
-        let held = ends.map_or_else(
-            || "no message".into(),
-            |(first, last)| format!("{} to {}", first.header.seq, last.header.seq),
-        );
-        bail!("there is no message {seq}: the trace has {held}");
-    };
+    let entry = run.asked(seq)?;
     let record = entry.record()?;
     let deltas: Vec<_> = run.deltas.iter().filter(|delta| delta.seq == seq).collect();
     if json {

@@ -92,7 +92,7 @@ impl Event {
             }
             Phase::Timed(at) if now_s >= at - 1e-9 => Phase::Acting(self.deed.begin(world, bodies), now_s),
             Phase::Acting(from, since) => {
-                let share = ((now_s - since) / self.over_s).min(1.0);
+                let share = if self.over_s > 0.0 { ((now_s - since) / self.over_s).min(1.0) } else { 1.0 };
                 self.deed.go_on(world, bodies, &from, share);
                 if share < 1.0 { Phase::Acting(from, since) } else { Phase::Done }
             }

@@ -9,8 +9,8 @@ use std::{
     sync::OnceLock,
 };
 
-/// A trace of one run, for all tests here.
-fn trace() -> &'static Path {
+/// A trace of one run, for all tests.
+pub fn trace() -> &'static Path {
     static TRACE: OnceLock<(tempfile::TempDir, PathBuf)> = OnceLock::new();
     let (_, path) = TRACE.get_or_init(|| {
         let dir = tempfile::tempdir().unwrap();
@@ -26,7 +26,7 @@ fn trace() -> &'static Path {
     path
 }
 
-fn prints(arguments: &[&str]) -> String {
+pub fn prints(arguments: &[&str]) -> String {
     let output = acm().args(arguments).output().unwrap();
     assert_eq!(output.status.code(), Some(0), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
     String::from_utf8(output.stdout).unwrap()

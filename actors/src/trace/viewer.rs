@@ -143,8 +143,39 @@ pub fn read_line(bytes: &[u8]) -> Option<(u64, String)> {
     Some((u64::from(line.line), line.message))
 }
 
+/// An image of a trace that was not compressed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Raster {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// `rgb8` or `32FC1`.
+    pub encoding: String,
+    /// The pixels, row by row without gaps.
+    pub data: Vec<u8>,
+}
+
+/// The image that a channel for raw images has; none for bytes of another form or of another length than they say.
+pub fn read_raster(bytes: &[u8]) -> Option<Raster> {
+    let RawImage { width, height, encoding, data, .. } = RawImage::decode(bytes).ok()?;
+    let pixel_bytes = match encoding.as_str() {
+        "rgb8" => 3,
+        "32FC1" => 4,
+        _ => return None,
+    };
+    let whole = u64::from(width) * u64::from(height) * pixel_bytes == data.len() as u64;
+    whole.then(|| Raster { width, height, encoding, data: data.into() })
+}
+
+/// The PNG that a channel for thumbnails has.
+pub fn read_thumbnail(bytes: &[u8]) -> Option<Vec<u8>> {
+    let image = CompressedImage::decode(bytes).ok()?;
+    (image.format == "png").then(|| image.data.into())
+}
+
 /// The name of a camera's frame, which begins its topics too.
-fn camera_frame(camera: &str) -> String {
+pub fn camera_frame(camera: &str) -> String {
     let plain = |sign: char| if sign.is_ascii_alphanumeric() || sign == '-' || sign == '_' { sign } else { '_' };
     format!("camera/{}", camera.chars().take(64).map(plain).collect::<String>())
 }

@@ -456,7 +456,10 @@ impl<'a> Meaning<'a> {
     fn event(&self, raw: &RawEvent) -> Result<EventSpec, ScenarioError> {
         let field = format!("event `{}`", raw.name);
         self.within(&format!("{field}.after_s"), raw.after_s, 0.0, 7200.0)?;
-        self.within(&format!("{field}.over_s"), raw.over_s, 0.02, 600.0)?;
+        // At once, or slowly enough to be a motion.
+        if raw.over_s != 0.0 {
+            self.within(&format!("{field}.over_s"), raw.over_s, 0.02, 600.0)?;
+        }
         self.within(&format!("{field}.lift_m"), raw.lift_m, 0.0, 2.0)?;
         let (others, known) = (self.others(), self.variables());
         let when = raw.when.as_ref().map(|text| self.expression(&field, text, &as_strs(&known))).transpose()?;

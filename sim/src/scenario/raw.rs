@@ -524,7 +524,7 @@ pub(crate) struct RawEvent {
     /// Its heading there, radians. Default: 0.
     #[serde(default)]
     pub(crate) yaw: Option<Number>,
-    /// How long it takes, seconds. Default: 1.
+    /// How long it takes, seconds: 0.02 to 600, or 0 for at once, as what slips out of a hand. Default: 1.
     #[serde(default = "one_f64")]
     pub(crate) over_s: f64,
     /// How high it is lifted on the way, metres. Default: 0.1.

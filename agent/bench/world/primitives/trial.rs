@@ -189,7 +189,7 @@ impl<'a> Stage<'a> {
         }
         if let Some(at_s) = slip_s {
             objects += &format!(
-                "[[event]]\nname = \"slip\"\nafter_s = {at_s}\nover_s = 0.002\ncarry = {{ object = \"thing\" }}\nto = [0.9, 0.9, {TABLE_M}]\n"
+                "[[event]]\nname = \"slip\"\nafter_s = {at_s}\nover_s = 0\ncarry = {{ object = \"thing\" }}\nto = [0.9, 0.9, {TABLE_M}]\n"
             );
         }
         let friction = values.get("friction");
