@@ -13,6 +13,8 @@ mod long;
 mod perceive;
 #[path = "command_line/real_frames.rs"]
 mod real_frames;
+#[path = "command_line/replay.rs"]
+mod replay;
 #[path = "command_line/synthetic.rs"]
 mod synthetic;
 #[path = "command_line/trace.rs"]

@@ -10,8 +10,6 @@ use std::path::{Path, PathBuf};
 pub struct Repaired {
     /// Messages on all channels.
     pub messages: u64,
-    /// How many of them stood in the chunk that was cut.
-    pub from_cut_chunk: u64,
     /// What was wrong with the file; `None` where it was whole.
     pub cut: Option<String>,
 }
@@ -23,11 +21,10 @@ pub fn run(args: &TraceRepairArgs) -> anyhow::Result<Exit> {
     match &repaired.cut {
         None => println!("{} is whole: {} messages, nothing to repair", args.file.display(), repaired.messages),
         Some(cut) => println!(
-            "{}: {cut}\n{}: {} messages, {} of them from the chunk that was cut",
+            "{}: {cut}\n{}: {} messages",
             args.file.display(),
             out.display(),
-            repaired.messages,
-            repaired.from_cut_chunk
+            repaired.messages
         ),
     }
     Ok(Exit::Success)
@@ -49,42 +46,28 @@ pub fn repair(from: &Path, to: &Path) -> anyhow::Result<Repaired> {
         bail!("the repaired file must be another one than {}: what is left is not overwritten", from.display());
     }
     let mut repaired = Repaired::default();
-    let mut checked = TraceReader::open(from)?;
-    while let Some(item) = checked.next_item() {
+    let mut reader = TraceReader::open(from)?;
+    while let Some(item) = reader.next_item() {
         repaired.messages += u64::from(matches!(item, Item::Message(_)));
     }
-    repaired.cut = checked.cut().map(str::to_owned);
+    repaired.cut = reader.cut().map(str::to_owned);
     if repaired.cut.is_none() {
         return Ok(repaired);
     }
     let writer = TraceWriter::create(to, TraceOptions::default())?;
-    // The same again without asking for the checksum of the last chunk, which is gone.
-    let mut unchecked = TraceReader::open_unchecked(from)?;
-    let mut written = 0;
-    while let Some(item) = unchecked.next_item() {
+    let mut reader = TraceReader::open(from)?;
+    while let Some(item) = reader.next_item() {
         match item {
             Item::Metadata { name, values } => writer.metadata(&name, values)?,
             Item::Attachment { name, media_type, data } => writer.attach(&name, &media_type, &data)?,
             Item::Message(message) => {
-                let vouched = written < repaired.messages;
-                if !vouched && !reads(&message.channel.encoding, &message.data) {
-                    break;
-                }
                 let channel = writer.channel(message.topic(), &message.channel.schema())?;
                 writer.put(channel, u64::from(message.sequence), message.time_ns, &message.data)?;
-                written += 1;
             }
         }
     }
     writer.finish()?;
-    repaired.from_cut_chunk = written - repaired.messages.min(written);
-    repaired.messages = written;
     Ok(repaired)
-}
-
-/// Whether a message that nothing vouches for has the form of its encoding.
-fn reads(encoding: &str, data: &[u8]) -> bool {
-    encoding != "json" || serde_json::from_slice::<serde::de::IgnoredAny>(data).is_ok()
 }
 
 fn same_file(a: &Path, b: &Path) -> bool {

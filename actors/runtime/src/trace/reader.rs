@@ -129,16 +129,6 @@ pub struct TraceReader {
 impl TraceReader {
     /// Opens a file and reads its header.
     pub fn open(path: &Path) -> Result<TraceReader, TraceReadError> {
-        TraceReader::open_as(path, true)
-    }
-
-    /// As [`TraceReader::open`], but gives what stands in the part that is left of a cut chunk as well. Nothing vouches
-    /// for those messages: the checksum stands at the end of the chunk.
-    pub fn open_unchecked(path: &Path) -> Result<TraceReader, TraceReadError> {
-        TraceReader::open_as(path, false)
-    }
-
-    fn open_as(path: &Path, checked: bool) -> Result<TraceReader, TraceReadError> {
         let failed = |e: std::io::Error| TraceReadError::Open { path: path.into(), reason: e.to_string() };
         let foreign = |reason: String| TraceReadError::Foreign { path: path.into(), reason };
         let file = File::open(path).map_err(failed)?;
@@ -150,7 +140,7 @@ impl TraceReader {
             return Err(TraceReadError::TooLarge { path: path.into(), bytes: about.len() });
         }
         let options = LinearReaderOptions::default()
-            .with_validate_chunk_crcs(checked)
+            .with_validate_chunk_crcs(true)
             .with_record_length_limit(2 * MAX_RECORD_BYTES);
         let mut reader = TraceReader {
             source: BufReader::new(file),
