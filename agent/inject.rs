@@ -5,7 +5,10 @@ use acm_concept::camera::{CameraError, CameraModel, CameraSource, RgbdFrame};
 use std::{
     fmt,
     str::FromStr,
-    sync::{Arc, Mutex, PoisonError},
+    sync::{
+        Arc, Mutex, PoisonError,
+        atomic::{AtomicBool, Ordering},
+    },
 };
 
 /// A fault, as `--inject` takes it.
@@ -87,7 +90,33 @@ pub struct Faults {
     pub drop_at: Option<u32>,
     /// See [`Injection::Panic`].
     pub panic_at: Option<(String, u64)>,
+    /// Where the faults of the cameras begin; at once if nothing says when.
+    pub cameras_from: Option<Signal>,
 }
+
+/// Something that is to happen once another thing has happened.
+#[derive(Debug, Clone, Default)]
+pub struct Signal(Arc<AtomicBool>);
+
+impl Signal {
+    /// It has happened.
+    pub fn give(&self) {
+        self.0.store(true, Ordering::SeqCst);
+    }
+    /// Whether it has.
+    pub fn is_given(&self) -> bool {
+        self.0.load(Ordering::SeqCst)
+    }
+}
+
+impl PartialEq for Signal {
+    /// Two handles of one signal.
+    fn eq(&self, other: &Signal) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+    }
+}
+
+impl Eq for Signal {}
 
 impl Faults {
     /// Sorts faults; of two that exclude each other the later one holds.
@@ -110,7 +139,7 @@ impl Faults {
         if !self.black_frames && !self.freeze_frames {
             return cameras;
         }
-        Box::new(FaultyCamera { cameras, black: self.black_frames, first: None })
+        Box::new(FaultyCamera { cameras, black: self.black_frames, from: self.cameras_from.clone(), first: None })
     }
 }
 
@@ -166,6 +195,7 @@ impl CameraSource for TappedCamera {
 struct FaultyCamera {
     cameras: Box<dyn CameraSource>,
     black: bool,
+    from: Option<Signal>,
     first: Option<RgbdFrame>,
 }
 
@@ -175,6 +205,11 @@ impl CameraSource for FaultyCamera {
     }
     fn capture(&mut self, camera: &str) -> Result<RgbdFrame, CameraError> {
         let mut frame = self.cameras.capture(camera)?;
+        if self.from.as_ref().is_some_and(|from| !from.is_given()) {
+            // Frozen is the last picture before the fault.
+            self.first = Some(frame.clone());
+            return Ok(frame);
+        }
         if self.black {
             frame.color = vec![0; frame.color.len()].into();
             frame.depth = vec![0.0; frame.depth.len()].into();

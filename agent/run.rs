@@ -223,7 +223,7 @@ fn line(result: &EpisodeResult) -> String {
     )
 }
 
-fn print_judgement(result: &EpisodeResult) -> anyhow::Result<()> {
+pub(crate) fn print_judgement(result: &EpisodeResult) -> anyhow::Result<()> {
     let mut out = std::io::stdout().lock();
     let verdict = &result.verdict;
     if !result.judged {

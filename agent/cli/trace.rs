@@ -1,6 +1,9 @@
 //! The verbs of `acm trace` and their arguments.
 
+use super::OnUnknownArg;
+use crate::inject::Injection;
 use acm_concept::ids::FrameId;
+use acm_sim::Setting;
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
 
@@ -66,6 +69,31 @@ pub struct TraceReplayArgs {
     /// Print each message, and wait for Enter before it is handled; `q` ends.
     #[arg(long)]
     pub step: bool,
+    /// Go on live after the message of this number, with what is set otherwise below. Up to it the run must be the
+    /// recorded one; physics and renderer run again.
+    #[arg(long, value_name = "N", conflicts_with_all = ["until", "step"])]
+    pub fork: Option<u64>,
+    /// What a fork sets otherwise.
+    #[command(flatten)]
+    pub otherwise: Otherwise,
+}
+
+/// What a fork sets otherwise.
+#[derive(Debug, Clone, Default, Args)]
+#[group(requires = "fork")]
+pub struct Otherwise {
+    /// A further fault. Black and frozen frames begin at the fork.
+    #[arg(long, value_name = "FAULT")]
+    pub inject: Vec<Injection>,
+    /// What to do when memory cannot decide.
+    #[arg(long, value_enum)]
+    pub on_unknown: Option<OnUnknownArg>,
+    /// A field of the scenario, as `acm run --set`.
+    #[arg(long, value_name = "PATH=VALUE")]
+    pub set: Vec<Setting>,
+    /// Write the forked run into this trace.
+    #[arg(long, value_name = "FILE")]
+    pub trace: Option<PathBuf>,
 }
 
 /// Arguments of `acm trace repair`.

@@ -20,12 +20,7 @@ pub fn run(args: &TraceRepairArgs) -> anyhow::Result<Exit> {
     let repaired = repair(&args.file, &out)?;
     match &repaired.cut {
         None => println!("{} is whole: {} messages, nothing to repair", args.file.display(), repaired.messages),
-        Some(cut) => println!(
-            "{}: {cut}\n{}: {} messages",
-            args.file.display(),
-            out.display(),
-            repaired.messages
-        ),
+        Some(cut) => println!("{}: {cut}\n{}: {} messages", args.file.display(), out.display(), repaired.messages),
     }
     Ok(Exit::Success)
 }

@@ -3,6 +3,8 @@
 //! Without `--resim` all handlers run again against what the host answered in the recorded run. With it, physics and
 //! renderer run again too. Each message is compared before it is handled, so a replay stops at the first that differs.
 
+mod fork;
+
 use super::{
     diff::{FieldDifference, field_differences, tell_fields},
     recorded::Recorded,
@@ -10,7 +12,7 @@ use super::{
 use crate::{
     cli::{Exit, RunArgs, trace::TraceReplayArgs},
     episode::{EpisodeConfig, Runner},
-    inject::Faults,
+    inject::{Faults, Signal},
     run::prepare,
 };
 use acm_actors::{message::Message, trace::words};
@@ -30,6 +32,9 @@ use std::{
 /// Runs `acm trace replay`.
 pub fn run(args: &TraceReplayArgs) -> anyhow::Result<Exit> {
     let recorded = Recorded::read(&args.file)?;
+    if let Some(after) = args.fork {
+        return fork::run(&recorded, args, after);
+    }
     let outcome = replay(&recorded, args)?;
     let out = &mut io::stdout().lock();
     match &outcome {
@@ -131,6 +136,8 @@ struct Comparison {
     whole: bool,
     until: Option<u64>,
     step: bool,
+    /// After which message the run may be another one, and who is told.
+    fork: Option<(u64, Signal)>,
     state: Mutex<State>,
 }
 
@@ -150,6 +157,7 @@ impl Comparison {
             whole: recorded.cut.is_none(),
             until: args.until,
             step: args.step,
+            fork: None,
             state: Mutex::default(),
         }
     }
@@ -161,6 +169,12 @@ impl Comparison {
         }
         let seq = message.seq;
         let expected = self.expected.get(&seq);
+        if let Some((after, signal)) = &self.fork
+            && seq > *after
+        {
+            signal.give();
+            return Ok(());
+        }
         if self.until.is_some_and(|until| seq > until) || (expected.is_none() && !self.whole) {
             state.stopped = true;
             return Err("the replay was to stop here".into());
@@ -181,7 +195,7 @@ impl Comparison {
         state.divergence = Some(Divergence {
             seq,
             recorded: self.lines.get(&seq).cloned(),
-            replayed: Some(format!("{} -> {} {}: {line}", message.from, message.to, kind_of(message))),
+            replayed: Some(line),
             fields,
             renderer: String::new(),
         });

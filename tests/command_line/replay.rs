@@ -107,6 +107,29 @@ fn a_recorded_run_is_replayed_from_its_trace_alone_and_with_its_world() {
 }
 
 #[test]
+fn a_fork_is_the_recorded_run_up_to_a_message_and_another_one_from_there() {
+    let dir = tempfile::tempdir().unwrap();
+    let (full, forked) = (&runs().full, dir.path().join("forked.mcap"));
+    let words = ["trace", "replay", text(full), "--fork", "900", "--inject", "black-frames", "--trace", text(&forked)];
+    let output = acm().args(words).output().unwrap();
+    let told = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert_eq!(output.status.code(), Some(3), "a robot that sees nothing gives up: {told}");
+    assert!(told.starts_with("as recorded up to message 900, then live"), "{told}");
+    let messages = |path| {
+        let (all, _) = messages(path);
+        let of = |message: TraceMessage| (message.topic().to_owned(), message.data);
+        let is_message = |message: &TraceMessage| message.channel.schema == "acm.Message";
+        all.into_iter().filter(is_message).map(of).collect::<Vec<_>>()
+    };
+    let (before, after) = (messages(full), messages(&forked));
+    assert!(before[..900] == after[..900] && before != after);
+    // What matters before the fork is told, and is no fork.
+    let told = finds(&["trace", "replay", text(full), "--fork", "900", "--set", "robot.model=\"panda\""]);
+    assert!(told.contains("before message 900"), "{told}");
+    refuses(&["trace", "replay", text(full), "--fork", "999999"], &["999999", "messages 1 to"]);
+}
+
+#[test]
 fn a_trace_without_pixels_is_replayed_with_its_world_only() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("hash.mcap");
