@@ -4,11 +4,15 @@ Shows how little it takes to look into a trace from Python, and lets a test comp
 """
 
 import json
+import pathlib
 import struct
 import sys
 
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
+
+sys.path.insert(0, str(pathlib.Path(__file__).parent.parent / "python"))
+from acm_trace import Trace  # noqa: E402
 
 
 def png_size(data):
@@ -47,5 +51,39 @@ def read(path):
         return found
 
 
+def compare(path, found):
+    """Holds our own small reader against what was found without it."""
+    run = Trace(path)
+    assert run.cut is None and run.about == found["run"] and sorted(run.attachments) == found["attachments"]
+    headers = [{name: message[name] for name in record} for message, record in zip(run.messages, found["messages"])]
+    assert headers == found["messages"] and all(message["line"] for message in run.messages)
+    assert list(run.frames) == found["frames"] and len(run.lines) == found["lines"]
+    assert [png_size(frame.thumbnail_png) for frame in run.frames.values()] == found["thumbnails"]
+    assert run.steps and run.steps[0].body("verdict") and "asked for by" in run.steps[0].reason
+    changed = next(change["object"] for change in run.changes if change["change"] == "object")
+    assert run.changes_of(changed)
+    try:
+        next(iter(run.frames.values())).color
+    except ValueError as error:
+        assert "--trace-frames full" in str(error)
+    else:
+        raise AssertionError("pixels that the trace does not keep")
+
+
+def cut(path):
+    """A file that ends early is read as far as it goes."""
+    half = pathlib.Path(path).with_suffix(".half")
+    data = pathlib.Path(path).read_bytes()
+    half.write_bytes(data[: len(data) // 2])
+    try:
+        run = Trace(half)
+        assert run.cut and 0 < len(run.messages) and run.about
+    finally:
+        half.unlink()
+
+
 if __name__ == "__main__":
-    json.dump(read(sys.argv[1]), sys.stdout)
+    everything = read(sys.argv[1])
+    compare(sys.argv[1], everything)
+    cut(sys.argv[1])
+    json.dump(everything, sys.stdout)
