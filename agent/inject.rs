@@ -2,6 +2,7 @@
 
 use acm_actors::episode::WipeAt;
 use acm_concept::camera::{CameraError, CameraModel, CameraSource, RgbdFrame};
+use glam::DVec3;
 use std::{
     fmt,
     str::FromStr,
@@ -11,6 +12,9 @@ use std::{
     },
 };
 
+/// By how much a misplaced frame's camera is said to stand aside, metres.
+const ASIDE: DVec3 = DVec3::new(0.02, 0.0, 0.0);
+
 /// A fault, as `--inject` takes it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Injection {
@@ -18,6 +22,8 @@ pub enum Injection {
     BlackFrames,
     /// Every frame shows what the first one showed.
     FreezeFrames,
+    /// The nth frame from 1 says that its camera stood 2 cm aside of where it stood, as after a knock.
+    MisplacedFrame(u32),
     /// Memory is wiped once at an event.
     WipeMemory(WipeAt),
     /// What the hand carries is taken out of it unseen, during its nth carry from 1.
@@ -39,6 +45,7 @@ impl fmt::Display for Injection {
         match self {
             Injection::BlackFrames => write!(f, "black-frames"),
             Injection::FreezeFrames => write!(f, "freeze-frames"),
+            Injection::MisplacedFrame(frame) => write!(f, "misplaced-frame@{frame}"),
             Injection::WipeMemory(event) => write!(f, "wipe-memory@{event}"),
             Injection::Slip(carry) => write!(f, "slip@{carry}"),
             Injection::Drop(carry) => write!(f, "drop@{carry}"),
@@ -57,6 +64,10 @@ impl FromStr for Injection {
                 .parse()
                 .map(Injection::WipeMemory)
                 .map_err(|e: acm_actors::episode::ParseEventError| e.to_string()),
+            Some(("misplaced-frame", frame)) => match frame.parse() {
+                Ok(frame) if frame > 0 => Ok(Injection::MisplacedFrame(frame)),
+                _ => Err(format!("`{frame}` is no number of a frame: write misplaced-frame@1 for the first")),
+            },
             Some((mishap @ ("slip" | "drop"), carry)) => match carry.parse() {
                 Ok(carry) if carry > 0 && mishap == "slip" => Ok(Injection::Slip(carry)),
                 Ok(carry) if carry > 0 => Ok(Injection::Drop(carry)),
@@ -70,7 +81,9 @@ impl FromStr for Injection {
                     _ => Err(format!("`{at}` is no message of an actor: write panic@perception:3")),
                 }
             }
-            _ => Err(format!("`{text}` is no fault: black-frames, freeze-frames, wipe-memory@EVENT, slip@N or drop@N")),
+            _ => Err(format!(
+                "`{text}` is no fault: black-frames, freeze-frames, misplaced-frame@N, wipe-memory@EVENT, slip@N or drop@N"
+            )),
         }
     }
 }
@@ -82,6 +95,8 @@ pub struct Faults {
     pub black_frames: bool,
     /// See [`Injection::FreezeFrames`].
     pub freeze_frames: bool,
+    /// See [`Injection::MisplacedFrame`].
+    pub misplaced: Option<u32>,
     /// See [`Injection::WipeMemory`].
     pub wipe_at: Option<WipeAt>,
     /// See [`Injection::Slip`].
@@ -126,6 +141,7 @@ impl Faults {
             match injection {
                 Injection::BlackFrames => faults.black_frames = true,
                 Injection::FreezeFrames => faults.freeze_frames = true,
+                Injection::MisplacedFrame(frame) => faults.misplaced = Some(*frame),
                 Injection::WipeMemory(event) => faults.wipe_at = Some(event.clone()),
                 Injection::Slip(carry) => faults.slip_at = Some(*carry),
                 Injection::Drop(carry) => faults.drop_at = Some(*carry),
@@ -136,10 +152,10 @@ impl Faults {
     }
     /// Puts the camera faults in front of a camera.
     pub fn cameras(&self, cameras: Box<dyn CameraSource>) -> Box<dyn CameraSource> {
-        if !self.black_frames && !self.freeze_frames {
+        if !self.black_frames && !self.freeze_frames && self.misplaced.is_none() {
             return cameras;
         }
-        Box::new(FaultyCamera { cameras, black: self.black_frames, from: self.cameras_from.clone(), first: None })
+        Box::new(FaultyCamera { cameras, faults: self.clone(), first: None, given: 0 })
     }
 }
 
@@ -194,9 +210,10 @@ impl CameraSource for TappedCamera {
 
 struct FaultyCamera {
     cameras: Box<dyn CameraSource>,
-    black: bool,
-    from: Option<Signal>,
+    faults: Faults,
     first: Option<RgbdFrame>,
+    /// Frames given so far.
+    given: u32,
 }
 
 impl CameraSource for FaultyCamera {
@@ -205,19 +222,25 @@ impl CameraSource for FaultyCamera {
     }
     fn capture(&mut self, camera: &str) -> Result<RgbdFrame, CameraError> {
         let mut frame = self.cameras.capture(camera)?;
-        if self.from.as_ref().is_some_and(|from| !from.is_given()) {
+        self.given += 1;
+        if self.faults.misplaced == Some(self.given) {
+            frame.header.camera_pose.translation += ASIDE;
+        }
+        if self.faults.cameras_from.as_ref().is_some_and(|from| !from.is_given()) {
             // Frozen is the last picture before the fault.
             self.first = Some(frame.clone());
             return Ok(frame);
         }
-        if self.black {
+        if self.faults.black_frames {
             frame.color = vec![0; frame.color.len()].into();
             frame.depth = vec![0.0; frame.depth.len()].into();
             return Ok(frame);
         }
-        let first = self.first.get_or_insert_with(|| frame.clone());
-        frame.color = first.color.clone();
-        frame.depth = first.depth.clone();
+        if self.faults.freeze_frames {
+            let first = self.first.get_or_insert_with(|| frame.clone());
+            frame.color = first.color.clone();
+            frame.depth = first.depth.clone();
+        }
         Ok(frame)
     }
 }
@@ -231,7 +254,14 @@ mod tests {
         assert_eq!(["slip@2", "drop@1"].map(str::parse), [Ok(Injection::Slip(2)), Ok(Injection::Drop(1))]);
         assert_eq!("wipe-memory@instruction".parse(), Ok(Injection::WipeMemory(WipeAt::Instruction)));
         assert_eq!("panic@memory:4".parse(), Ok(Injection::Panic { role: "memory".into(), message: 4 }));
-        for word in ["black-frames", "freeze-frames", "wipe-memory@first-verified-place", "slip@2", "panic@memory:4"] {
+        for word in [
+            "black-frames",
+            "freeze-frames",
+            "misplaced-frame@2",
+            "wipe-memory@first-verified-place",
+            "slip@2",
+            "panic@memory:4",
+        ] {
             assert_eq!(word.parse::<Injection>().map(|fault| fault.to_string()), Ok(word.into()));
         }
         for bad in

@@ -59,5 +59,5 @@ pub(super) fn run(recorded: &Recorded, args: &TraceReplayArgs, after: u64) -> an
 /// Camera faults that are new begin at the fork; those that the recorded run had begin where they did.
 fn begins_at_fork(all: &[crate::inject::Injection], new: usize, begins: &Signal) -> Option<Signal> {
     let before = Faults::new(all.get(..all.len() - new).unwrap_or_default());
-    (!before.black_frames && !before.freeze_frames).then(|| begins.clone())
+    (!before.black_frames && !before.freeze_frames && before.misplaced.is_none()).then(|| begins.clone())
 }

@@ -206,6 +206,7 @@ density_kg_m3 = 1000
 [[model.solid]]
 shape = "box"
 size = [0.12, 0.012, 0.06]
+position = [0, 0, 0.03]
 color = "#a0a0a0"
 [[model]]
 model = "loaf"
@@ -214,6 +215,7 @@ density_kg_m3 = 700
 [[model.solid]]
 shape = "box"
 size = [0.1, 0.07, 0.05]
+position = [0, 0, 0.025]
 color = "#a06020"
 "##;
         let objects = format!(
@@ -230,7 +232,7 @@ position = [0.1, 0.15, {TABLE_M}]
 name = "sliced"
 [[rule]]
 name = "an edge on the loaf slices it"
-when = "abs(blade_x - loaf_x) < 0.05 && abs(blade_y - loaf_y) < 0.03 && blade_z < loaf_z + {} && blade_pads > 1"
+when = "abs(blade_x - loaf_x) < 0.05 && abs(blade_y - loaf_y) < 0.03 && blade_z < loaf_z + {} && blade_touched > 1"
 set = {{ sliced = 1 }}
 "#,
             LOAF_M + 0.001
