@@ -35,6 +35,10 @@ const MOVING_M_S: f64 = 0.002;
 /// A hand that comes free springs forward by as much as what pulls it was ahead, 15 mm: 60 N down to the deflection at which
 /// they are reached and ever less from there, on 1.5 kg, m/s.
 const RELEASE_M_S: f64 = 0.95;
+/// A hand that is pulled along with nearly all that a wrist bears, 60 N, is dragged; and no faster than what falls by a
+/// metre, m/s.
+const DRAGGED_N: f64 = 55.0;
+const FALLING_M_S: f64 = 4.5;
 /// Fingers that meet an object at their full speed press for an instant by a quarter more than they may.
 const IMPACT: f64 = 1.25;
 
@@ -54,6 +58,8 @@ pub(crate) struct Hand {
     /// What the drive of its fingers closed them with in this step, newtons. Not what the pads feel: a finger that is
     /// pushed into a gap feels the gap's sides many times as strongly as it is pushed.
     pub(crate) grip_n: f64,
+    /// With what the outside world pulls it, newtons, as far as its wrist bears.
+    pub(crate) pulled: DVec3,
     pub(crate) max_speed_m_s: f64,
     pub(crate) max_grip_n: f64,
 }
@@ -126,8 +132,10 @@ impl Audit {
     fn watch_hands(&mut self, hands: &[Hand], step_s: f64, now_s: f64) {
         let before = std::mem::replace(&mut self.hands, hands.iter().map(|hand| hand.at).collect());
         for (hand, before) in hands.iter().zip(before) {
-            let speed = before.distance(hand.at) / step_s;
-            if speed > hand.max_speed_m_s + RELEASE_M_S {
+            let (speed, way) = (before.distance(hand.at) / step_s, (hand.at - before).normalize_or_zero());
+            // What pulls it harder than it can hold takes it along.
+            let dragged = hand.pulled.dot(way) > DRAGGED_N;
+            if speed > if dragged { FALLING_M_S } else { hand.max_speed_m_s + RELEASE_M_S } {
                 self.tell(now_s, &format!("a hand moved at {speed:.2} m/s, it can {} m/s", hand.max_speed_m_s));
             }
             if hand.grip_n > hand.max_grip_n * IMPACT {
@@ -353,10 +361,23 @@ mod tests {
     fn a_hand_that_jumps_or_crushes_is_caught() {
         let world = world();
         let mut audit = Audit::default();
-        let hand = |x: f64, grip_n: f64| [Hand { at: DVec3::X * x, grip_n, max_speed_m_s: 0.5, max_grip_n: 40.0 }];
-        for (x, grip_n, violations) in [(0.0, 0.0, 0), (0.002, 45.0, 0), (0.02, 0.0, 1), (0.02, 55.0, 2)] {
-            audit.step(&world.physics, &[], &hand(x, grip_n), x);
-            assert_eq!(audit.report().violations, violations, "{:?}", audit.report());
+        let hand = |x: f64, grip_n: f64, pulled_n: f64| {
+            let pulled = DVec3::X * pulled_n;
+            [Hand { at: DVec3::X * x, grip_n, pulled, max_speed_m_s: 0.5, max_grip_n: 40.0 }]
+        };
+        // Moved, gripped, jumped, crushed; dragged along, as nothing drags, and against what pulls it.
+        let steps = [
+            (0.0, 0.0, 0.0, 0),
+            (0.002, 45.0, 0.0, 0),
+            (0.02, 0.0, 0.0, 1),
+            (0.02, 55.0, 0.0, 2),
+            (0.03, 0.0, 60.0, 2),
+            (0.06, 0.0, 60.0, 3),
+            (0.07, 0.0, -60.0, 4),
+        ];
+        for (x, grip_n, pulled_n, violations) in steps {
+            audit.step(&world.physics, &[], &hand(x, grip_n, pulled_n), x);
+            assert_eq!(audit.report().violations, violations, "{x} {:?}", audit.report());
         }
     }
 }

@@ -186,6 +186,7 @@ impl Robot {
             audit::Hand {
                 at: tcp.translation,
                 grip_n: if let Hand::Fingers(fingers) = &limb.hand { fingers.grip_n(world) } else { 0.0 },
+                pulled: limb.wrist.force(world),
                 max_speed_m_s: limb.robot.max_speed_m_s,
                 max_grip_n: limb.robot.max_grip_force_n,
             }
