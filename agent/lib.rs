@@ -8,6 +8,7 @@
 //! | [`remote`] | `acm run --robot`: an episode on a robot in another process |
 //! | [`serve`] | `acm sim serve`: the simulator as such a robot |
 //! | [`inject`] | faults that can be put between the agent and its world |
+//! | [`llm`] | which language model reads instructions, if any |
 //! | [`narrate`] | the story of an episode, told from its messages |
 //! | [`demo`] | `acm demo`: the first minute |
 //! | [`perceive`] | `acm perceive`: real frames, no simulator |
@@ -26,6 +27,7 @@ pub mod doctor;
 pub mod embed;
 pub mod episode;
 pub mod inject;
+pub mod llm;
 pub mod narrate;
 pub mod perceive;
 pub mod remote;

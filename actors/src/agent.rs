@@ -4,8 +4,9 @@ use crate::{
     episode::{Episode, Until, WipeAt},
     executor::ExecutorActor,
     host::{HostPort, Outside},
+    llm::LlmPort,
     memory::{MemoryActor, MemoryObserver},
-    message::{EPISODE, EXECUTOR, HOST, MEMORY, Message, PERCEPTION, PLANNER, VERIFIER},
+    message::{EPISODE, EXECUTOR, HOST, LLM, MEMORY, Message, PERCEPTION, PLANNER, VERIFIER},
     perception::PerceptionActor,
     planner::PlannerActor,
     report::EpisodeReport,
@@ -18,6 +19,7 @@ use acm_concept::{
     task::{OnUnknown, TaskSpec},
     template::TemplateLibrary,
 };
+use acm_llm::Backend;
 use acm_memory::Memory;
 use acm_perception::{Grounder, GrounderConfig};
 use acm_planner::{Lexicon, PlanOptions, Planner};
@@ -33,6 +35,7 @@ use std::{
     time::Duration,
 };
 use thiserror::Error;
+use tokio::sync::watch;
 
 /// Frames that stay on the bus.
 const BUS_FRAMES: usize = 8;
@@ -69,6 +72,7 @@ pub struct AgentBuilder {
     wipe_at: Option<WipeAt>,
     until: Option<Until>,
     panic_at: Option<PanicAt>,
+    llm: Option<Arc<dyn Backend>>,
 }
 
 impl AgentBuilder {
@@ -115,6 +119,11 @@ impl AgentBuilder {
     /// Makes an actor panic, as a fault for tests.
     pub fn panic_at(mut self, panic_at: Option<PanicAt>) -> Self {
         self.panic_at = panic_at;
+        self
+    }
+    /// Lets a language model read instructions; the rules read them without one, and where it fails.
+    pub fn llm(mut self, llm: Option<Arc<dyn Backend>>) -> Self {
+        self.llm = llm;
         self
     }
     /// The agent.
@@ -165,6 +174,7 @@ impl Agent {
             wipe_at: None,
             until: None,
             panic_at: None,
+            llm: None,
         }
     }
 
@@ -194,7 +204,8 @@ impl Agent {
         };
         let outside = Arc::new(Mutex::new(Outside { embodiment, cameras, clock }));
         let robot = Arc::clone(&outside);
-        let mut system = self.system(task, camera, outside).starts_at(began).start().await?;
+        let (end_calls, ending) = watch::channel(false);
+        let mut system = self.system(task, camera, outside, ending).starts_at(began).start().await?;
         system.send(EPISODE, Message::Begin);
         let result = tokio::select! {
             biased;
@@ -203,9 +214,11 @@ impl Agent {
                 // Not by message: the robot must stop even if its port has a queue or is ended before it comes to it.
                 tokio::task::block_in_place(|| robot.lock().unwrap_or_else(PoisonError::into_inner).embodiment.stop());
                 system.send(EPISODE, Message::Interrupt);
+                end_calls.send_replace(true);
                 system.result(WALL_LIMIT).await
             }
         };
+        end_calls.send_replace(true);
         let spent = system.stop().await;
         match result? {
             Message::Ended(report) => Ok(EpisodeRun { report: *report, spent }),
@@ -216,7 +229,13 @@ impl Agent {
         }
     }
 
-    fn system(&self, task: TaskSpec, camera: String, outside: Arc<Mutex<Outside>>) -> SystemBuilder<Message> {
+    fn system(
+        &self,
+        task: TaskSpec,
+        camera: String,
+        outside: Arc<Mutex<Outside>>,
+        ending: watch::Receiver<bool>,
+    ) -> SystemBuilder<Message> {
         let parts = &self.parts;
         let bus: Arc<dyn FrameBus<RgbdFrame>> = Arc::new(InProcessBus::new(BUS_FRAMES));
         let robot = outside.lock().unwrap_or_else(PoisonError::into_inner).embodiment.description().clone();
@@ -231,7 +250,8 @@ impl Agent {
             None => Arc::clone(&parts.journal),
         };
         let observer = parts.trace.clone().map(|trace| trace as Arc<dyn MemoryObserver>);
-        SystemBuilder::new(1, journal)
+        let (llm, hybrid) = (parts.llm.clone(), parts.llm.is_some());
+        let system = SystemBuilder::new(1, journal)
             .actor(EPISODE, Box::new(move || Box::new(Episode::new(task.clone(), wipe_at.clone()).until(until))))
             .actor(
                 HOST,
@@ -254,7 +274,7 @@ impl Agent {
                 PLANNER,
                 Box::new(move || {
                     let (planner, library) = (Arc::clone(&planner), Arc::clone(&library));
-                    Box::new(PlannerActor::new(planner, library, plans.clone(), options))
+                    Box::new(PlannerActor::new(planner, library, plans.clone(), options).hybrid(hybrid))
                 }),
             )
             .actor(EXECUTOR, Box::new(move || Box::new(ExecutorActor::new(hands.clone()))))
@@ -267,6 +287,10 @@ impl Agent {
                     restarted: failure.restarted,
                 }),
             )
-            .panic_at(parts.panic_at)
+            .panic_at(parts.panic_at);
+        match llm {
+            Some(llm) => system.actor(LLM, Box::new(move || Box::new(LlmPort::new(Arc::clone(&llm), ending.clone())))),
+            None => system,
+        }
     }
 }

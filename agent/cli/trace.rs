@@ -1,7 +1,7 @@
 //! The verbs of `acm trace` and their arguments.
 
 use super::OnUnknownArg;
-use crate::inject::Injection;
+use crate::{inject::Injection, llm::LlmId};
 use acm_concept::ids::FrameId;
 use acm_sim::Setting;
 use clap::{Args, Subcommand};
@@ -88,6 +88,9 @@ pub struct Otherwise {
     /// What to do when memory cannot decide.
     #[arg(long, value_enum)]
     pub on_unknown: Option<OnUnknownArg>,
+    /// Another language model for what is asked after the fork, as `acm run --llm`; the run's own if absent.
+    #[arg(long, value_name = "ID")]
+    pub llm: Option<LlmId>,
     /// A field of the scenario, as `acm run --set`.
     #[arg(long, value_name = "PATH=VALUE")]
     pub set: Vec<Setting>,
@@ -175,6 +178,9 @@ pub struct TraceExportArgs {
     /// Trace events for Perfetto or chrome://tracing.
     #[arg(long, value_name = "FILE")]
     pub chrome: Option<PathBuf>,
+    /// What a language model was asked and replied, as a cassette for `acm run --llm replay=FILE`.
+    #[arg(long, value_name = "FILE")]
+    pub cassette: Option<PathBuf>,
     /// A point cloud (PLY) of each frame; needs a trace with --trace-frames full.
     #[arg(long, value_name = "FOLDER")]
     pub points: Option<PathBuf>,

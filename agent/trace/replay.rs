@@ -14,6 +14,7 @@ use crate::{
     cli::{Exit, RunArgs, trace::TraceReplayArgs},
     episode::{EpisodeConfig, Runner},
     inject::{Faults, Signal},
+    llm::Llm,
     run::prepare,
 };
 use acm_actors::{message::Message, trace::words};
@@ -115,8 +116,11 @@ fn tell(divergence: &Divergence, out: &mut impl Write) -> io::Result<()> {
 /// # Errors
 /// The trace does not hold what the replay needs.
 pub fn replay(recorded: &Recorded, args: &TraceReplayArgs) -> anyhow::Result<Outcome> {
-    let run = recorded.arguments()?;
+    let mut run = recorded.arguments()?;
+    // What a model replied is in the trace: its files need not be there.
+    let llm = recorded.llm(std::mem::take(&mut run.llm))?.map(Llm::Cassette);
     let (config, library) = prepare(&run)?;
+    let config = EpisodeConfig { llm, ..config };
     let comparison = Arc::new(Comparison::new(recorded, args));
     let journal = Arc::clone(&comparison) as Arc<dyn Journal<Message>>;
     let seed = recorded.seed()?;
@@ -153,6 +157,8 @@ struct Comparison {
     step: bool,
     /// After which message the run may be another one, and who is told.
     fork: Option<(u64, Signal)>,
+    /// From which message on another model answers, and who is told.
+    other_llm: Option<(u64, Signal)>,
     state: Mutex<State>,
 }
 
@@ -177,6 +183,7 @@ impl Comparison {
             until: args.until,
             step: args.step,
             fork: None,
+            other_llm: None,
             state: Mutex::default(),
         }
     }
@@ -188,6 +195,11 @@ impl Comparison {
         }
         let seq = message.seq;
         let expected = self.expected.get(&seq);
+        if let Some((from, signal)) = &self.other_llm
+            && seq >= *from
+        {
+            signal.give();
+        }
         if let Some((after, signal)) = &self.fork
             && seq > *after
         {

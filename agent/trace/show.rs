@@ -1,7 +1,7 @@
 //! `acm trace show`: the messages of a run.
 
 use super::{
-    decision,
+    calls, decision,
     run_file::{Entry, RunFile},
 };
 use crate::cli::{Exit, trace::TraceShowArgs};
@@ -180,6 +180,9 @@ fn one(run: &RunFile, seq: u64, json: bool, out: &mut impl Write) -> anyhow::Res
     writeln!(out, "{}", entry.line)?;
     for words in deltas.iter().filter_map(|delta| decision::delta_words(delta)) {
         writeln!(out, "memory: {words}")?;
+    }
+    if calls::tell(entry, out)? {
+        return Ok(());
     }
     serde_json::to_writer_pretty(&mut *out, &record.body).map_err(io::Error::from)?;
     writeln!(out)?;

@@ -2,6 +2,7 @@
 
 use crate::{message::Message, report::Ending};
 use acm_concept::{embodiment::Feedback, pose::Pose, skill::SkillReport};
+use acm_llm::Answer;
 use acm_memory::observation::{Grounding, Note, Outcome, Verdict};
 use acm_planner::Decision;
 
@@ -18,15 +19,19 @@ pub enum Level {
 
 /// Most objects that one line names.
 const MAX_NAMED: usize = 8;
+/// Most of a prompt or a reply that one line has, characters.
+const MAX_QUOTED: usize = 100;
 
 /// A message in one line.
 pub fn line(message: &Message) -> (Level, String) {
     let level = match message {
         Message::Command(_) | Message::Moved(_) | Message::Sense => Level::Routine,
         Message::Interrupt | Message::Wipe | Message::Refused { .. } | Message::Broken { .. } => Level::Trouble,
-        Message::ActorFailed { .. } | Message::Retreated { failure: Some(_) } | Message::Parsed(Err(_)) => {
-            Level::Trouble
-        }
+        Message::ActorFailed { .. }
+        | Message::Retreated { failure: Some(_) }
+        | Message::Parsed { task: Err(_), .. } => Level::Trouble,
+        Message::Parsed { reading: Some(reading), .. } if reading.fallback.is_some() => Level::Trouble,
+        Message::LlmReplied(answer) if matches!(**answer, Answer::Error(_)) => Level::Trouble,
         Message::Updated { blindness: Some(_), .. } => Level::Trouble,
         Message::Verdict { verdict, .. } if verdict.outcome != Outcome::Verified => Level::Trouble,
         Message::SkillEnded(report) if report.failure.is_some() => Level::Trouble,
@@ -76,11 +81,27 @@ fn text(message: &Message) -> String {
             format!("{kept}; {} objects, {} transitions", view.0.objects().len(), view.0.transitions().len())
         }
         Message::Parse { instruction } => format!("read \"{instruction}\""),
-        Message::Parsed(Ok(task)) => {
-            let subtasks = task.subtasks.iter().enumerate().map(|(i, s)| format!("{} \"{}\"", i + 1, s.text));
-            format!("{} subtasks{}", task.subtasks.len(), listed(": ", subtasks, ""))
+        Message::AskLlm { request } => {
+            let last = request.turns.last().map(acm_llm::Turn::text).unwrap_or_default();
+            let again = if request.turns.len() > 1 { ", again" } else { "" };
+            format!("prompt {}{again}: {}", request.prompt, short(&last))
         }
-        Message::Parsed(Err(reason)) => format!("not understood: {reason}"),
+        Message::LlmReplied(answer) => match &**answer {
+            Answer::Reply(reply) => {
+                format!("{} ({}), {}: {}", reply.model, reply.backend, reply.usage, short(&reply.text))
+            }
+            Answer::Error(error) => format!("no reply: {error}"),
+        },
+        Message::Parsed { task, reading } => {
+            let read = reading.as_ref().map_or_else(String::new, |reading| format!("; {reading}"));
+            match task {
+                Ok(task) => {
+                    let subtasks = task.subtasks.iter().enumerate().map(|(i, s)| format!("{} \"{}\"", i + 1, s.text));
+                    format!("{} subtasks{}{read}", task.subtasks.len(), listed(": ", subtasks, ""))
+                }
+                Err(reason) => format!("not understood: {reason}{read}"),
+            }
+        }
         Message::Decide { situation, .. } => {
             format!("what next? {} looks in a row, {} skills left", situation.looks, situation.skills_left)
         }
@@ -117,6 +138,15 @@ fn text(message: &Message) -> String {
         Message::Ended(report) => {
             format!("{}; {} skills, {} frames", report.ending, report.steps.len(), report.frames_perceived)
         }
+    }
+}
+
+/// The beginning of a text, on one line.
+fn short(text: &str) -> String {
+    let line = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    match line.char_indices().nth(MAX_QUOTED) {
+        Some((end, _)) => format!("{}...", line.get(..end).unwrap_or_default()),
+        None => line,
     }
 }
 

@@ -5,6 +5,7 @@ use crate::{
     cli::{Exit, trace::TraceReplayArgs},
     episode::{EpisodeConfig, Runner},
     inject::{Faults, Signal},
+    llm::Llm,
     run::{exit_of, prepare, print_judgement},
     trace::recording::TraceRequest,
 };
@@ -29,16 +30,30 @@ pub(super) fn run(recorded: &Recorded, args: &TraceReplayArgs, after: u64) -> an
     run.on_unknown = otherwise.on_unknown.unwrap_or(run.on_unknown);
     let name = run.scenario.as_deref().context("the run was on a robot in another process: it has no simulator")?;
     let scenario = Scenario::open_with(name, &run.set)?;
+    // Up to the fork the model replies as it did; what the last recorded message asks is asked of the other one.
+    let (id, other) = (std::mem::take(&mut run.llm), Signal::default());
+    let before = recorded.llm(id.clone())?;
+    run.llm = otherwise.llm.clone().unwrap_or(id);
     let (config, library) = prepare(&run)?;
+    let afterwards = config.llm.clone().map(Box::new);
+    let llm = match before {
+        Some(before) => Some(Llm::Fork { before, after: afterwards, from: other.clone() }),
+        None => config.llm.clone(),
+    };
     let memory = recorded.memory()?;
     let begins = Signal::default();
     let config = EpisodeConfig {
         memory: memory.as_ref().map(|folder| folder.path().to_path_buf()),
+        llm,
         trace: otherwise.trace.clone().map(|path| TraceRequest { path, frames: FrameDetail::default() }),
         faults: Faults { cameras_from: begins_at_fork(&run.inject, otherwise.inject.len(), &begins), ..config.faults },
         ..config
     };
-    let comparison = Arc::new(Comparison { fork: Some((after, begins)), ..Comparison::new(recorded, args) });
+    let comparison = Arc::new(Comparison {
+        fork: Some((after, begins)),
+        other_llm: Some((after, other)),
+        ..Comparison::new(recorded, args)
+    });
     let runner = Runner::with_library(library)?;
     runner.end_on_ctrl_c();
     let journal = Arc::clone(&comparison) as Arc<dyn Journal<Message>>;
