@@ -50,10 +50,11 @@ pub fn run(args: &RunArgs) -> anyhow::Result<Exit> {
             Arc::new(Narrator::new(Box::new(std::io::stdout())))
         }
     };
+    let on_unknown = config.settings.on_unknown;
     let result = filmed(&runner, video, config, journal, |config, journal| {
         runner.run_remote(&robot, args.seed.first, config, journal)
     })?;
-    tell_result(&Source { name: &address.to_string(), sensor: "the host's" }, args, &result)?;
+    tell_result(&Source { name: &address.to_string(), sensor: "the host's", on_unknown }, args, &result)?;
     if let Ending::Broken { reason } = &result.report.ending {
         eprintln!("acm: the run broke off: {reason}");
     }
