@@ -309,6 +309,8 @@ impl Runner {
         trace: Option<Arc<Trace>>,
     ) -> anyhow::Result<Lived> {
         let memory = acm_baselines::by_name(&config.method, Arc::clone(&self.library), config.memory.as_deref())?;
+        let donor = config.faults.transplant.as_ref().map(|(donor, _)| donor);
+        let donated = donor.map(|donor| acm_memory::read_events(donor)).transpose()?.unwrap_or_default();
         let panic_at = config.panic_at.as_ref().or(config.faults.panic_at.as_ref());
         let agent = Agent::builder(Arc::clone(&self.library), memory)
             .settings(config.settings.clone())
@@ -316,6 +318,7 @@ impl Runner {
             .seed(seed)
             .lexicon(self.lexicon.clone())
             .wipe_at(config.faults.wipe_at.clone())
+            .transplant_at(config.faults.transplant.as_ref().map(|(_, at)| at.clone()), donated.into())
             .until(config.until)
             .journal(journal)
             .trace(trace.clone())

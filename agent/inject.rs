@@ -1,13 +1,16 @@
 //! Faults that can be put between the agent and its world.
 
-use acm_actors::{episode::WipeAt, settings::Signal};
+use acm_actors::{episode::FaultEvent, settings::Signal};
 use acm_concept::camera::{CameraError, CameraModel, CameraSource, RgbdFrame};
 use std::{
     fmt,
+    path::PathBuf,
     str::FromStr,
     sync::{Arc, Mutex, PoisonError},
 };
 
+/// How the fault begins that puts another memory into the run's own place.
+const TRANSPLANT: &str = "transplant-memory=";
 /// By how much a misplaced frame's camera is said to stand aside where the fault does not say it, millimetres.
 const ASIDE_MM: u32 = 20;
 /// A knock that moves a camera farther than this is a fall, millimetres.
@@ -23,7 +26,14 @@ pub enum Injection {
     /// A frame says that its camera stood aside of where it stood, as after a knock.
     MisplacedFrame(Misplaced),
     /// Memory is wiped once at an event.
-    WipeMemory(WipeAt),
+    WipeMemory(FaultEvent),
+    /// The memory in a folder takes the place of the run's own once at an event.
+    TransplantMemory {
+        /// The folder. It is left as it is.
+        donor: PathBuf,
+        /// When.
+        at: FaultEvent,
+    },
     /// What the hand carries is taken out of it unseen, during its nth carry from 1.
     Slip(u32),
     /// The fingers open for a moment during the nth carry from 1, and what they carry falls.
@@ -77,6 +87,7 @@ impl fmt::Display for Injection {
                 write!(f, "misplaced-frame@{}:{}", frame.frame, frame.aside_mm)
             }
             Injection::WipeMemory(event) => write!(f, "wipe-memory@{event}"),
+            Injection::TransplantMemory { donor, at } => write!(f, "{TRANSPLANT}{}@{at}", donor.display()),
             Injection::Slip(carry) => write!(f, "slip@{carry}"),
             Injection::Drop(carry) => write!(f, "drop@{carry}"),
             Injection::Panic { role, message } => write!(f, "panic@{role}:{message}"),
@@ -87,6 +98,14 @@ impl fmt::Display for Injection {
 impl FromStr for Injection {
     type Err = String;
     fn from_str(text: &str) -> Result<Self, String> {
+        if let Some(transplant) = text.strip_prefix(TRANSPLANT) {
+            let (donor, event) =
+                transplant.rsplit_once('@').filter(|(donor, _)| !donor.is_empty()).ok_or_else(|| {
+                    format!("`{text}` does not name a folder and an event: write {TRANSPLANT}DIR@instruction")
+                })?;
+            let at = event.parse().map_err(|e: acm_actors::episode::ParseEventError| e.to_string())?;
+            return Ok(Injection::TransplantMemory { donor: donor.into(), at });
+        }
         match text.split_once('@') {
             None if text == "black-frames" => Ok(Injection::BlackFrames),
             None if text == "freeze-frames" => Ok(Injection::FreezeFrames),
@@ -111,7 +130,7 @@ impl FromStr for Injection {
                 }
             }
             _ => Err(format!(
-                "`{text}` is no fault: black-frames, freeze-frames, misplaced-frame@N[:MM], wipe-memory@EVENT, slip@N or drop@N"
+                "`{text}` is no fault: black-frames, freeze-frames, misplaced-frame@N[:MM], wipe-memory@EVENT, transplant-memory=DIR@EVENT, slip@N or drop@N"
             )),
         }
     }
@@ -127,7 +146,9 @@ pub struct Faults {
     /// See [`Injection::MisplacedFrame`].
     pub misplaced: Option<Misplaced>,
     /// See [`Injection::WipeMemory`].
-    pub wipe_at: Option<WipeAt>,
+    pub wipe_at: Option<FaultEvent>,
+    /// See [`Injection::TransplantMemory`]: the folder and the event.
+    pub transplant: Option<(PathBuf, FaultEvent)>,
     /// See [`Injection::Slip`].
     pub slip_at: Option<u32>,
     /// See [`Injection::Drop`].
@@ -146,6 +167,7 @@ impl Faults {
                 Injection::FreezeFrames => faults.freeze_frames = true,
                 Injection::MisplacedFrame(frame) => faults.misplaced = Some(*frame),
                 Injection::WipeMemory(event) => faults.wipe_at = Some(event.clone()),
+                Injection::TransplantMemory { donor, at } => faults.transplant = Some((donor.clone(), at.clone())),
                 Injection::Slip(carry) => faults.slip_at = Some(*carry),
                 Injection::Drop(carry) => faults.drop_at = Some(*carry),
                 Injection::Panic { role, message } => faults.panic_at = Some((role.clone(), *message)),
@@ -293,13 +315,14 @@ mod tests {
     #[test]
     fn faults_are_read_and_mistakes_named() {
         assert_eq!(["slip@2", "drop@1"].map(str::parse), [Ok(Injection::Slip(2)), Ok(Injection::Drop(1))]);
-        assert_eq!("wipe-memory@instruction".parse(), Ok(Injection::WipeMemory(WipeAt::Instruction)));
+        assert_eq!("wipe-memory@instruction".parse(), Ok(Injection::WipeMemory(FaultEvent::Instruction)));
         assert_eq!("panic@memory:4".parse(), Ok(Injection::Panic { role: "memory".into(), message: 4 }));
         for word in [
             "black-frames",
             "freeze-frames",
             "misplaced-frame@2:20",
             "wipe-memory@first-verified-place",
+            "transplant-memory=a@b/c@instruction",
             "slip@2",
             "panic@memory:4",
         ] {
@@ -313,6 +336,9 @@ mod tests {
             "slip",
             "wipe-memory@noon",
             "white-frames",
+            "transplant-memory=@instruction",
+            "transplant-memory=there",
+            "transplant-memory=there@noon",
             "misplaced-frame@0",
             "misplaced-frame@1:0",
             "misplaced-frame@1:9999",

@@ -59,6 +59,9 @@ pub(crate) fn prepare(args: &RunArgs) -> anyhow::Result<(EpisodeConfig, Template
     };
     // A misspelt method or a memory that cannot be opened must not cost the start of the renderer.
     drop(acm_baselines::by_name(&config.method, Arc::new(library.clone()), config.memory.as_deref())?);
+    if let Some((donor, _)) = &config.faults.transplant {
+        drop(acm_memory::read_events(donor)?);
+    }
     Ok((config, library))
 }
 

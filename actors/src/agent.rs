@@ -1,7 +1,7 @@
 //! The builder that puts an agent together, and one episode's run.
 
 use crate::{
-    episode::{Episode, Until, WipeAt},
+    episode::{Episode, FaultEvent, Until, Upheavals},
     executor::ExecutorActor,
     host::{HostPort, Outside},
     memory::{MemoryActor, MemoryObserver},
@@ -19,7 +19,7 @@ use acm_concept::{
     task::TaskSpec,
     template::TemplateLibrary,
 };
-use acm_memory::Memory;
+use acm_memory::{Memory, event::Event};
 use acm_perception::Grounder;
 use acm_planner::{Lexicon, PlanOptions, Planner};
 use acm_runtime::{
@@ -67,7 +67,8 @@ pub struct AgentBuilder {
     lexicon: Option<Lexicon>,
     journal: Arc<dyn Journal<Message>>,
     trace: Option<Arc<Trace>>,
-    wipe_at: Option<WipeAt>,
+    upheavals: Upheavals,
+    donated: Arc<[Event]>,
     until: Option<Until>,
     panic_at: Option<PanicAt>,
 }
@@ -104,8 +105,13 @@ impl AgentBuilder {
         self
     }
     /// Wipes memory at an event, as a fault for tests.
-    pub fn wipe_at(mut self, event: Option<WipeAt>) -> Self {
-        self.wipe_at = event;
+    pub fn wipe_at(mut self, event: Option<FaultEvent>) -> Self {
+        self.upheavals.wipe_at = event;
+        self
+    }
+    /// Puts what another memory came to into this one's place at an event, as a fault for tests.
+    pub fn transplant_at(mut self, event: Option<FaultEvent>, donated: Arc<[Event]>) -> Self {
+        (self.upheavals.transplant_at, self.donated) = (event, donated);
         self
     }
     /// Ends each run at an event; see [`crate::report::Ending::Until`].
@@ -163,7 +169,8 @@ impl Agent {
             lexicon: None,
             journal: Arc::new(NoJournal),
             trace: None,
-            wipe_at: None,
+            upheavals: Upheavals::default(),
+            donated: Arc::default(),
             until: None,
             panic_at: None,
         }
@@ -227,7 +234,8 @@ impl Agent {
             settings.clone().map(|settings| Arc::new(Grounder::new(Arc::clone(&library), settings.perception)));
         let seed = parts.seed;
         let options = settings.map(|settings| PlanOptions { on_unknown: settings.on_unknown, seed });
-        let (memory, wipe_at, until) = (Arc::downgrade(&parts.memory), parts.wipe_at.clone(), parts.until);
+        let (memory, upheavals, until) = (Arc::downgrade(&parts.memory), parts.upheavals.clone(), parts.until);
+        let donated = Arc::clone(&parts.donated);
         let planner = Arc::clone(&self.planner);
         let (frames, seen, kept) = (Arc::clone(&bus), Arc::clone(&bus), bus);
         let (eyes, hands, plans) = (robot.clone(), robot.clone(), robot);
@@ -237,7 +245,7 @@ impl Agent {
         };
         let observer = parts.trace.clone().map(|trace| trace as Arc<dyn MemoryObserver>);
         SystemBuilder::new(1, journal)
-            .actor(EPISODE, Box::new(move || Box::new(Episode::new(task.clone(), wipe_at.clone()).until(until))))
+            .actor(EPISODE, Box::new(move || Box::new(Episode::new(task.clone(), upheavals.clone()).until(until))))
             .actor(
                 HOST,
                 Box::new(move || Box::new(HostPort::new(Arc::clone(&outside), camera.clone(), Arc::clone(&frames)))),
@@ -249,7 +257,7 @@ impl Agent {
             .actor(
                 MEMORY,
                 Box::new(move || {
-                    let actor = MemoryActor::new(Weak::clone(&memory), Arc::clone(&kept));
+                    let actor = MemoryActor::new(Weak::clone(&memory), Arc::clone(&kept)).donated(Arc::clone(&donated));
                     Box::new(actor.observed_by(observer.clone()))
                 }),
             )

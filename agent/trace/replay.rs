@@ -115,7 +115,8 @@ fn tell(divergence: &Divergence, out: &mut impl Write) -> io::Result<()> {
 /// # Errors
 /// The trace does not hold what the replay needs.
 pub fn replay(recorded: &Recorded, args: &TraceReplayArgs) -> anyhow::Result<Outcome> {
-    let run = recorded.arguments()?;
+    let donor = recorded.donor()?;
+    let run = recorded.arguments(donor.as_ref().map(tempfile::TempDir::path))?;
     let (config, library) = prepare(&run)?;
     let comparison = Arc::new(Comparison::new(recorded, args));
     let journal = Arc::clone(&comparison) as Arc<dyn Journal<Message>>;
@@ -138,7 +139,8 @@ pub fn replay(recorded: &Recorded, args: &TraceReplayArgs) -> anyhow::Result<Out
         let runner = Runner::without_renderer(library)?;
         runner.end_on_ctrl_c();
         // What befell the cameras and the robot is in what they gave; what befell the agent befalls it again.
-        let faults = Faults { wipe_at: config.faults.wipe_at, panic_at: config.faults.panic_at, ..Faults::default() };
+        let Faults { wipe_at, transplant, panic_at, .. } = config.faults;
+        let faults = Faults { wipe_at, transplant, panic_at, ..Faults::default() };
         let config = EpisodeConfig { faults, no_motion: false, ..config };
         (runner.live(recorded.task()?, outside, seed, &config, journal, None).map(|_| ()), String::new())
     };

@@ -161,6 +161,26 @@ fn a_run_with_a_configuration_is_replayed_without_its_file() {
 }
 
 #[test]
+fn a_fork_goes_on_with_another_memory_and_is_replayed_without_its_folder() {
+    let dir = tempfile::tempdir().unwrap();
+    let (donor, forked) = (dir.path().join("donor"), dir.path().join("forked.mcap"));
+    acm().args(["run", "put-back-block", "--seed", "4", "--json", "--memory", text(&donor)]).output().unwrap();
+    let fault = format!("transplant-memory={}@first-verified-place", donor.display());
+    let words = ["trace", "replay", text(&runs().full), "--fork", "700", "--inject", &fault, "--trace", text(&forked)];
+    let output = acm().args(words).output().unwrap();
+    let told = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(told.starts_with("as recorded up to message 700, then live"), "{told}");
+    assert!(prints(&["trace", "show", text(&forked), "--kind", "transplant"]).contains("episode > memory"));
+
+    let path = dir.path().join("transplanted.mcap");
+    let words = ["run", "put-back-block", "--seed", "3", "--json", "--trace-frames", "full", "--inject", &fault];
+    acm().args(words).arg("--trace").arg(&path).output().unwrap();
+    fs::remove_dir_all(&donor).unwrap();
+    assert!(prints(&["trace", "replay", text(&path)]).starts_with("identical: "));
+    refuses(&words, &["holds no memory", text(&donor)]);
+}
+
+#[test]
 fn a_trace_without_pixels_is_replayed_with_its_world_only() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("hash.mcap");

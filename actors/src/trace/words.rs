@@ -23,7 +23,9 @@ const MAX_NAMED: usize = 8;
 pub fn line(message: &Message) -> (Level, String) {
     let level = match message {
         Message::Command(_) | Message::Moved(_) | Message::Sense => Level::Routine,
-        Message::Interrupt | Message::Wipe | Message::Refused { .. } | Message::Broken { .. } => Level::Trouble,
+        Message::Interrupt | Message::Wipe | Message::Transplant | Message::Refused { .. } | Message::Broken { .. } => {
+            Level::Trouble
+        }
         Message::ActorFailed { .. } | Message::Retreated { failure: Some(_) } | Message::Parsed(Err(_)) => {
             Level::Trouble
         }
@@ -69,6 +71,7 @@ fn text(message: &Message) -> String {
         }
         Message::Note(note) => note_words(note),
         Message::Wipe => "forget everything".into(),
+        Message::Transplant => "forget everything and believe what another memory came to".into(),
         Message::Record(executed) => format!("keep: {}", skill_words(&executed.report)),
         Message::Settle { transition, verdict } => format!("{transition} {}", verdict_words(verdict)),
         Message::Kept { transition, view } => {

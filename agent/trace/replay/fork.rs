@@ -24,7 +24,8 @@ pub(super) fn run(recorded: &Recorded, args: &TraceReplayArgs, after: u64) -> an
     if after == 0 || after >= last {
         bail!("there is nothing to fork after message {after}: the run has messages 1 to {last}");
     }
-    let (mut run, otherwise) = (recorded.arguments()?, &args.otherwise);
+    let donor = recorded.donor()?;
+    let (mut run, otherwise) = (recorded.arguments(donor.as_ref().map(tempfile::TempDir::path))?, &args.otherwise);
     // What happens in the world happens at a moment of its own; a moment before the fork is no fork, and is told.
     let (cameras, others): (Vec<_>, Vec<_>) = otherwise.inject.iter().cloned().partition(Injection::is_of_cameras);
     run.inject.extend(others);
