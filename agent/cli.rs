@@ -187,6 +187,10 @@ pub struct RunArgs {
     /// Draw the episode into this GIF: what is seen, what is remembered, what is planned. One seed only.
     #[arg(long, value_name = "FILE.gif")]
     pub video: Option<PathBuf>,
+    /// Show how the run goes on while it does: on a terminal a block that is drawn anew, elsewhere a line for each
+    /// message worth telling. With --json on standard error.
+    #[arg(long)]
+    pub live: bool,
     /// Print the results as JSON instead of text.
     #[arg(long)]
     pub json: bool,

@@ -7,6 +7,8 @@ mod chromium;
 mod demo;
 #[path = "command_line/export.rs"]
 mod export;
+#[path = "command_line/live.rs"]
+mod live;
 #[path = "command_line/long.rs"]
 mod long;
 #[path = "command_line/perceive.rs"]
