@@ -2,7 +2,6 @@
 
 use acm_actors::episode::WipeAt;
 use acm_concept::camera::{CameraError, CameraModel, CameraSource, RgbdFrame};
-use glam::DVec3;
 use std::{
     fmt,
     str::FromStr,
@@ -12,8 +11,10 @@ use std::{
     },
 };
 
-/// By how much a misplaced frame's camera is said to stand aside, metres.
-const ASIDE: DVec3 = DVec3::new(0.02, 0.0, 0.0);
+/// By how much a misplaced frame's camera is said to stand aside where the fault does not say it, millimetres.
+const ASIDE_MM: u32 = 20;
+/// A knock that moves a camera farther than this is a fall, millimetres.
+const MAX_ASIDE_MM: u32 = 1000;
 
 /// A fault, as `--inject` takes it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -22,8 +23,8 @@ pub enum Injection {
     BlackFrames,
     /// Every frame shows what the first one showed.
     FreezeFrames,
-    /// The nth frame from 1 says that its camera stood 2 cm aside of where it stood, as after a knock.
-    MisplacedFrame(u32),
+    /// A frame says that its camera stood aside of where it stood, as after a knock.
+    MisplacedFrame(Misplaced),
     /// Memory is wiped once at an event.
     WipeMemory(WipeAt),
     /// What the hand carries is taken out of it unseen, during its nth carry from 1.
@@ -39,13 +40,38 @@ pub enum Injection {
     },
 }
 
+/// A frame whose camera is said to stand where it did not.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Misplaced {
+    /// Which frame, from 1.
+    pub frame: u32,
+    /// By how much along the world's x, millimetres.
+    pub aside_mm: u32,
+}
+
+impl FromStr for Misplaced {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (frame, aside) = text.split_once(':').map_or((text, None), |(frame, aside)| (frame, Some(aside)));
+        let frame = frame.parse().ok().filter(|frame| *frame > 0);
+        let frame = frame.ok_or("misplaced-frame@1 is the first frame, misplaced-frame@1:50 the same by 50 mm")?;
+        let aside_mm = aside.map_or(Some(ASIDE_MM), |mm| mm.parse().ok());
+        let aside_mm = aside_mm.filter(|mm| (1..=MAX_ASIDE_MM).contains(mm));
+        let aside_mm =
+            aside_mm.ok_or(format!("a camera is misplaced by 1 to {MAX_ASIDE_MM} mm: misplaced-frame@1:50"))?;
+        Ok(Misplaced { frame, aside_mm })
+    }
+}
+
 impl fmt::Display for Injection {
     /// As `--inject` takes it.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Injection::BlackFrames => write!(f, "black-frames"),
             Injection::FreezeFrames => write!(f, "freeze-frames"),
-            Injection::MisplacedFrame(frame) => write!(f, "misplaced-frame@{frame}"),
+            Injection::MisplacedFrame(frame) => {
+                write!(f, "misplaced-frame@{}:{}", frame.frame, frame.aside_mm)
+            }
             Injection::WipeMemory(event) => write!(f, "wipe-memory@{event}"),
             Injection::Slip(carry) => write!(f, "slip@{carry}"),
             Injection::Drop(carry) => write!(f, "drop@{carry}"),
@@ -64,10 +90,9 @@ impl FromStr for Injection {
                 .parse()
                 .map(Injection::WipeMemory)
                 .map_err(|e: acm_actors::episode::ParseEventError| e.to_string()),
-            Some(("misplaced-frame", frame)) => match frame.parse() {
-                Ok(frame) if frame > 0 => Ok(Injection::MisplacedFrame(frame)),
-                _ => Err(format!("`{frame}` is no number of a frame: write misplaced-frame@1 for the first")),
-            },
+            Some(("misplaced-frame", frame)) => {
+                frame.parse().map(Injection::MisplacedFrame).map_err(|e| format!("`{frame}`: {e}"))
+            }
             Some((mishap @ ("slip" | "drop"), carry)) => match carry.parse() {
                 Ok(carry) if carry > 0 && mishap == "slip" => Ok(Injection::Slip(carry)),
                 Ok(carry) if carry > 0 => Ok(Injection::Drop(carry)),
@@ -82,7 +107,7 @@ impl FromStr for Injection {
                 }
             }
             _ => Err(format!(
-                "`{text}` is no fault: black-frames, freeze-frames, misplaced-frame@N, wipe-memory@EVENT, slip@N or drop@N"
+                "`{text}` is no fault: black-frames, freeze-frames, misplaced-frame@N[:MM], wipe-memory@EVENT, slip@N or drop@N"
             )),
         }
     }
@@ -96,7 +121,7 @@ pub struct Faults {
     /// See [`Injection::FreezeFrames`].
     pub freeze_frames: bool,
     /// See [`Injection::MisplacedFrame`].
-    pub misplaced: Option<u32>,
+    pub misplaced: Option<Misplaced>,
     /// See [`Injection::WipeMemory`].
     pub wipe_at: Option<WipeAt>,
     /// See [`Injection::Slip`].
@@ -223,8 +248,8 @@ impl CameraSource for FaultyCamera {
     fn capture(&mut self, camera: &str) -> Result<RgbdFrame, CameraError> {
         let mut frame = self.cameras.capture(camera)?;
         self.given += 1;
-        if self.faults.misplaced == Some(self.given) {
-            frame.header.camera_pose.translation += ASIDE;
+        if let Some(misplaced) = self.faults.misplaced.filter(|misplaced| misplaced.frame == self.given) {
+            frame.header.camera_pose.translation.x += 1e-3 * f64::from(misplaced.aside_mm);
         }
         if self.faults.cameras_from.as_ref().is_some_and(|from| !from.is_given()) {
             // Frozen is the last picture before the fault.
@@ -248,6 +273,42 @@ impl CameraSource for FaultyCamera {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use acm_concept::{
+        camera::{FrameHeader, Intrinsics},
+        ids::FrameId,
+        pose::Pose,
+        time::Time,
+    };
+    use glam::DVec3;
+
+    /// Gives frames of one pixel whose ids count from 1.
+    struct Counting(u32);
+
+    impl CameraSource for Counting {
+        fn cameras(&self) -> &[CameraModel] {
+            &[]
+        }
+        fn capture(&mut self, camera: &str) -> Result<RgbdFrame, CameraError> {
+            self.0 += 1;
+            let header = FrameHeader {
+                id: FrameId(self.0.into()),
+                camera: camera.into(),
+                camera_pose: Pose { translation: DVec3::new(0.1, 0.2, 0.3), ..Pose::IDENTITY },
+                time: Time::ZERO,
+                intrinsics: Intrinsics { width: 1, height: 1, fx: 1.0, fy: 1.0, cx: 0.0, cy: 0.0 },
+            };
+            Ok(RgbdFrame { header, color: vec![0; 3].into(), depth: vec![1.0].into() })
+        }
+    }
+
+    #[test]
+    fn only_the_one_frame_is_said_to_stand_aside() {
+        let mut cameras = Faults::new(&["misplaced-frame@2:50".parse().unwrap()]).cameras(Box::new(Counting(0)));
+        let mut stood = |_| cameras.capture("head").map(|frame| frame.header.camera_pose.translation).unwrap();
+        let stands = [1, 2, 3].map(&mut stood);
+        let nominal = DVec3::new(0.1, 0.2, 0.3);
+        assert_eq!(stands, [nominal, nominal + DVec3::new(0.05, 0.0, 0.0), nominal]);
+    }
 
     #[test]
     fn faults_are_read_and_mistakes_named() {
@@ -257,16 +318,25 @@ mod tests {
         for word in [
             "black-frames",
             "freeze-frames",
-            "misplaced-frame@2",
+            "misplaced-frame@2:20",
             "wipe-memory@first-verified-place",
             "slip@2",
             "panic@memory:4",
         ] {
             assert_eq!(word.parse::<Injection>().map(|fault| fault.to_string()), Ok(word.into()));
         }
-        for bad in
-            ["panic@memory", "panic@butler:1", "panic@memory:0", "slip@0", "slip", "wipe-memory@noon", "white-frames"]
-        {
+        for bad in [
+            "panic@memory",
+            "panic@butler:1",
+            "panic@memory:0",
+            "slip@0",
+            "slip",
+            "wipe-memory@noon",
+            "white-frames",
+            "misplaced-frame@0",
+            "misplaced-frame@1:0",
+            "misplaced-frame@1:9999",
+        ] {
             assert!(bad.parse::<Injection>().is_err(), "{bad}");
         }
     }

@@ -211,10 +211,10 @@ impl Told {
                 let past: String = past.map(|r| format!("; \"{}\" is {}", r.phrase, r.how)).collect();
                 vec![format!("decide    {}{past}", explanation.plan.join(", then "))]
             }
-            Decision::Look { reason } => vec![format!("look      {reason}")],
-            Decision::SubtaskDone { index, reason } => vec![format!("done      subtask {}: {reason}", index + 1)],
+            Decision::Look { reason, .. } => vec![format!("look      {reason}")],
+            Decision::SubtaskDone { index, reason, .. } => vec![format!("done      subtask {}: {reason}", index + 1)],
             Decision::Done { .. } => Vec::new(),
-            Decision::GiveUp { unknown } => {
+            Decision::GiveUp { unknown, .. } => {
                 self.gave_up = true;
                 vec![format!("give up   {}", unknown.text)]
             }

@@ -168,7 +168,7 @@ impl Reel {
                 self.plan = format!("subtask {} is done", index + 1);
                 self.add(library, None, time_s, ("", WHITE), FOUND_S);
             }
-            Decision::Look { reason } => {
+            Decision::Look { reason, .. } => {
                 let news = format!("looks again: {reason}");
                 self.add(library, None, time_s, (&news, GREY), SEEN_S);
             }

@@ -254,7 +254,7 @@ impl Episode {
                 self.send(Doing::Noting, MEMORY, Message::Note(note), out);
             }
             Decision::Done { .. } => self.instruction_done(out),
-            Decision::GiveUp { unknown } => self.give_up(unknown.cause, unknown.text, out),
+            Decision::GiveUp { unknown, .. } => self.give_up(unknown.cause, unknown.text, out),
         }
         Ok(())
     }

@@ -2,7 +2,7 @@
 
 use crate::message::{EPISODE, Message};
 use acm_concept::{embodiment::RobotDescription, template::TemplateLibrary};
-use acm_planner::{Decision, GiveUpCause, PlanOptions, Planner, Unknown};
+use acm_planner::{Decision, GiveUpCause, Grounds, PlanOptions, Planner, Unknown};
 use acm_runtime::{
     core::{Core, CoreError, Outbox},
     envelope::Envelope,
@@ -45,7 +45,8 @@ impl Core<Message> for PlannerActor {
                         }
                         Err(error) => {
                             let unknown = Unknown { cause: GiveUpCause::Plan, text: error.to_string() };
-                            let decision = Box::new(Decision::GiveUp { unknown });
+                            let grounds = Grounds::default();
+                            let decision = Box::new(Decision::GiveUp { unknown, grounds });
                             Message::Decided { decision, invocation: None }
                         }
                     },

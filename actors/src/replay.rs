@@ -74,6 +74,11 @@ impl Answer {
                 let FrameBody { header, feedback } = form(body).map_err(failed)?;
                 let missing = || failed("the trace does not keep the frame's pixels".into());
                 let (color, depth) = pixels(&header).ok_or_else(missing)?;
+                let (width, height) = (header.intrinsics.width, header.intrinsics.height);
+                let count = width as usize * height as usize;
+                if (color.len(), depth.len()) != (3 * count, count) {
+                    return Err(failed(format!("the pixels that the trace keeps are not {width}x{height}")));
+                }
                 Answered::Frame(Box::new(RgbdFrame { header, color: color.into(), depth: depth.into() }), feedback)
             }
             "moved" => Answered::Moved(form(body).map_err(failed)?),

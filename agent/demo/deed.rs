@@ -99,7 +99,7 @@ impl Told {
                 lines.push(super::below(&format!("why?    {}", self.why)));
                 lines
             }
-            Decision::GiveUp { unknown } => vec![super::below(&format!("GIVES UP: \"{}\"", unknown.text))],
+            Decision::GiveUp { unknown, .. } => vec![super::below(&format!("GIVES UP: \"{}\"", unknown.text))],
             _ => Vec::new(),
         }
     }

@@ -241,9 +241,9 @@ impl Rolls {
                 self.skills += 1;
                 format!("step {}: {step}, predicted {:.2}", self.skills, step.prediction.success)
             }
-            Decision::Look { reason } => format!("looks again: {reason}"),
+            Decision::Look { reason, .. } => format!("looks again: {reason}"),
             Decision::SubtaskDone { reason, .. } => format!("done: {reason}"),
-            Decision::GiveUp { unknown } => format!("gives up: {}", unknown.text),
+            Decision::GiveUp { unknown, .. } => format!("gives up: {}", unknown.text),
             Decision::Done { .. } => return,
         };
         self.repeat(caption, time_s);

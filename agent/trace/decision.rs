@@ -9,9 +9,9 @@ use acm_memory::{
     observation::{Outcome, Verdict},
     query::Recall,
 };
-use acm_planner::{Explanation, ResolvedReference, Step, Unknown};
+use acm_planner::{Decision, Explanation, ResolvedReference, Step};
 use anyhow::bail;
-use serde::{Deserialize, de::DeserializeOwned};
+use serde::de::DeserializeOwned;
 use std::io::{self, Write};
 
 /// Most hits of a retrieval that are printed.
@@ -82,55 +82,14 @@ impl StepSpan {
     }
 }
 
-/// A decision read back.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Decided {
-    /// Run a skill.
-    Act(Box<Act>),
-    /// Observe again.
-    Look {
-        /// What the look is for.
-        reason: String,
-    },
-    /// A subtask is done.
-    SubtaskDone {
-        /// Its index, from 0.
-        index: u32,
-        /// Why it counts as done.
-        reason: String,
-    },
-    /// All is done.
-    Done {
-        /// Why it counts as done.
-        reason: String,
-    },
-    /// Nothing honest is left to do.
-    GiveUp {
-        /// What is not known or not possible.
-        unknown: Unknown,
-    },
-}
-
-/// The decision to run a skill.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-pub struct Act {
-    /// The skill.
-    pub step: Step,
-    /// Why this one.
-    pub explanation: Explanation,
-}
-
-impl Decided {
-    /// The decision in a message of the kind `decided`.
-    ///
-    /// # Errors
-    /// The message has another form.
-    pub fn read(entry: &Entry) -> anyhow::Result<Decided> {
-        let decision = entry.record()?.body.get_mut("decision").map(serde_json::Value::take).unwrap_or_default();
-        serde_json::from_value(decision)
-            .map_err(|e| anyhow::anyhow!("the decision of message {} cannot be read: {e}", entry.header.seq))
-    }
+/// The decision in a message of the kind `decided`.
+///
+/// # Errors
+/// The message has another form.
+pub fn read(entry: &Entry) -> anyhow::Result<Decision> {
+    let decision = entry.record()?.body.get_mut("decision").map(serde_json::Value::take).unwrap_or_default();
+    serde_json::from_value(decision)
+        .map_err(|e| anyhow::anyhow!("the decision of message {} cannot be read: {e}", entry.header.seq))
 }
 
 /// Prints the decision behind the nth step (from 1).
@@ -141,8 +100,7 @@ pub fn show(run: &RunFile, number: usize, out: &mut impl Write) -> anyhow::Resul
     };
     let entries = span.entries(run);
     let Some(first) = entries.first() else { bail!("step {number} is empty") };
-    let Decided::Act(act) = Decided::read(first)? else { bail!("step {number} is no decision to act") };
-    let Act { step, explanation } = *act;
+    let Decision::Act { step, explanation } = read(first)? else { bail!("step {number} is no decision to act") };
     writeln!(
         out,
         "step {number} of {}: {step}   t {:.2} s, message {}",

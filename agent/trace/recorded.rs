@@ -1,6 +1,7 @@
 //! A trace read for being run again.
 
 use super::{
+    picture::{self, Picture},
     recording::MEMORY_FOLDER,
     replay::run_arguments,
     run_file::{Entry, Header, RunFile},
@@ -10,10 +11,9 @@ use acm_actors::{
     host::Outside,
     message::HOST,
     replay::{Answer, outside},
-    trace::viewer,
 };
-use acm_concept::{embodiment::RobotDescription, task::TaskSpec, time::Time};
-use acm_runtime::trace::{Item, TraceReader, reader::TraceMessage};
+use acm_concept::{embodiment::RobotDescription, ids::FrameId, task::TaskSpec, time::Time};
+use acm_runtime::trace::{Item, TraceReader};
 use anyhow::{Context, bail};
 use serde::{Deserialize, de::DeserializeOwned};
 use std::{collections::BTreeMap, path::Path};
@@ -30,8 +30,8 @@ pub struct Recorded {
     /// Why the trace ends too early, if it does.
     pub cut: Option<String>,
     attached: BTreeMap<String, Vec<u8>>,
-    /// Colour and depth by camera and number of the message that asked for them.
-    pixels: BTreeMap<(String, u64), [Option<Vec<u8>>; 2]>,
+    /// Colour and depth of the frames that are kept in full.
+    pixels: BTreeMap<FrameId, (Vec<u8>, Vec<f32>)>,
 }
 
 #[derive(Deserialize)]
@@ -50,42 +50,26 @@ impl Recorded {
     pub fn read(path: &Path) -> anyhow::Result<Recorded> {
         let run = RunFile::read(path)?;
         let mut recorded = Recorded { about: run.about, entries: run.entries, cut: run.cut, ..Recorded::default() };
-        let (mut reader, mut held) = (TraceReader::open(path)?, 0);
+        let mut reader = TraceReader::open(path)?;
         while let Some(item) = reader.next_item() {
-            match item {
-                Item::Attachment { name, data, .. } => {
-                    recorded.attached.insert(name, data);
-                }
-                Item::Message(message) => {
-                    held += recorded.keep(&message);
-                    if held > MAX_PIXEL_BYTES {
-                        bail!("{} has more than {MAX_PIXEL_BYTES} bytes of frames", path.display());
-                    }
-                }
-                Item::Metadata { .. } => {}
+            if let Item::Attachment { name, data, .. } = item {
+                recorded.attached.insert(name, data);
             }
         }
+        let mut held = 0;
+        picture::each(path, |frame, picture| {
+            let Picture::Full { color, depth } = picture else { return Ok(()) };
+            held += color.len() + size_of_val(depth.as_slice());
+            if held > MAX_PIXEL_BYTES {
+                bail!("{} has more than {MAX_PIXEL_BYTES} bytes of frames", path.display());
+            }
+            recorded.pixels.insert(frame, (color.into_raw(), depth));
+            Ok(())
+        })?;
         if recorded.entries.is_empty() {
             bail!("{} holds no message: there is nothing to replay", path.display());
         }
         Ok(recorded)
-    }
-
-    /// Keeps the pixels of a frame; tells how many bytes they are.
-    fn keep(&mut self, message: &TraceMessage) -> usize {
-        let topic = message.topic().strip_prefix("/camera/").and_then(|rest| rest.rsplit_once('/'));
-        let place = match topic {
-            Some((_, "color")) => 0,
-            Some((_, "depth")) => 1,
-            _ => return 0,
-        };
-        let (Some((camera, _)), Some(bytes)) = (topic, viewer::read_image(&message.data)) else { return 0 };
-        let length = bytes.len();
-        let frame = self.pixels.entry((camera.into(), u64::from(message.sequence))).or_default();
-        if let Some(slot) = frame.get_mut(place) {
-            *slot = Some(bytes);
-        }
-        length
     }
 
     /// A value of what is known of the run; `?` where it is not.
@@ -158,13 +142,7 @@ impl Recorded {
     }
 
     fn answer(&self, entry: &Entry) -> anyhow::Result<Answer> {
-        let asked = entry.header.cause.unwrap_or_default();
-        let pixels = |header: &acm_concept::camera::FrameHeader| {
-            let [color, depth] = self.pixels.get(&(header.camera.clone(), asked))?;
-            let metres = bytemuck::pod_collect_to_vec::<u8, f32>(depth.as_ref()?);
-            Some((color.clone()?, metres))
-        };
-        Answer::read(entry.record()?, pixels)
+        Answer::read(entry.record()?, |header| self.pixels.get(&header.id).cloned())
             .context("record with `--trace-frames full`, or replay with `--resim`, which draws the frames anew")
     }
 

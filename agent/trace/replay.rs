@@ -8,6 +8,7 @@ mod fork;
 use super::{
     diff::{FieldDifference, field_differences, tell_fields},
     recorded::Recorded,
+    run_file::Entry,
 };
 use crate::{
     cli::{Exit, RunArgs, trace::TraceReplayArgs},
@@ -17,17 +18,20 @@ use crate::{
 };
 use acm_actors::{message::Message, trace::words};
 use acm_runtime::{
-    envelope::Envelope,
+    envelope::{Envelope, OUTSIDE},
     journal::{Journal, JournalError},
     trace::record,
 };
 use acm_sim::Scenario;
 use anyhow::Context;
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     io::{self, BufRead, IsTerminal, Write},
     sync::{Arc, Mutex, PoisonError},
 };
+
+/// Kind of the message by which somebody ends a run from outside.
+const INTERRUPT: &str = "interrupt";
 
 /// Runs `acm trace replay`.
 pub fn run(args: &TraceReplayArgs) -> anyhow::Result<Exit> {
@@ -46,6 +50,9 @@ pub fn run(args: &TraceReplayArgs) -> anyhow::Result<Exit> {
             }
         }
         Outcome::Stopped { messages } => writeln!(out, "identical up to message {messages}, where it was to stop")?,
+        Outcome::Interrupted { messages } => {
+            writeln!(out, "identical up to message {messages}, where the run was interrupted by hand")?;
+        }
         Outcome::Diverged(divergence) => {
             tell(divergence, out)?;
             if args.resim && recorded.about("renderer") != divergence.renderer {
@@ -67,6 +74,12 @@ pub enum Outcome {
     },
     /// Every message came again up to the one where it was to stop.
     Stopped {
+        /// The last one.
+        messages: u64,
+    },
+    /// Every message came again up to where somebody had ended the run from outside, which no replay does at the same
+    /// instant.
+    Interrupted {
         /// The last one.
         messages: u64,
     },
@@ -134,6 +147,8 @@ struct Comparison {
     lines: BTreeMap<u64, String>,
     /// Whether the recorded run came to its end.
     whole: bool,
+    /// The message by which somebody ended the run from outside.
+    interrupt: Option<u64>,
     until: Option<u64>,
     step: bool,
     /// After which message the run may be another one, and who is told.
@@ -143,7 +158,7 @@ struct Comparison {
 
 #[derive(Default)]
 struct State {
-    compared: u64,
+    compared: BTreeSet<u64>,
     stopped: bool,
     divergence: Option<Divergence>,
 }
@@ -151,10 +166,14 @@ struct State {
 impl Comparison {
     fn new(recorded: &Recorded, args: &TraceReplayArgs) -> Comparison {
         let messages = || recorded.entries.iter();
+        let seq = |entry: &Entry| entry.header.seq;
         Comparison {
-            expected: messages().map(|entry| (entry.header.seq, entry.raw().to_vec())).collect(),
-            lines: messages().map(|entry| (entry.header.seq, entry.line.clone())).collect(),
+            expected: messages().map(|entry| (seq(entry), entry.raw().to_vec())).collect(),
+            lines: messages().map(|entry| (seq(entry), entry.line.clone())).collect(),
             whole: recorded.cut.is_none(),
+            interrupt: messages()
+                .find(|entry| entry.header.from == OUTSIDE.0 && entry.header.kind == INTERRUPT)
+                .map(seq),
             until: args.until,
             step: args.step,
             fork: None,
@@ -175,14 +194,15 @@ impl Comparison {
             signal.give();
             return Ok(());
         }
-        if self.until.is_some_and(|until| seq > until) || (expected.is_none() && !self.whole) {
+        let interrupted = self.interrupt.is_some_and(|interrupt| seq >= interrupt);
+        if interrupted || self.until.is_some_and(|until| seq > until) || (expected.is_none() && !self.whole) {
             state.stopped = true;
             return Err("the replay was to stop here".into());
         }
         let bytes = record::encode(message).map_err(|error| error.to_string())?;
         let (_, line) = words::line(&message.body);
         if expected.is_some_and(|expected| *expected == bytes) {
-            state.compared += 1;
+            state.compared.insert(seq);
             if self.step && !wait_for_enter(seq, message, &line) {
                 state.stopped = true;
                 return Err("the replay was stopped".into());
@@ -204,18 +224,20 @@ impl Comparison {
 
     fn outcome(&self, ended: anyhow::Result<()>, renderer: String) -> anyhow::Result<Outcome> {
         let state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
-        let messages = state.compared;
+        let messages = state.compared.len() as u64;
         if let Some(divergence) = state.divergence.clone() {
             return Ok(Outcome::Diverged(Box::new(Divergence { renderer, ..divergence })));
         }
+        let seen = state.compared.last().copied().unwrap_or_default();
         if state.stopped {
-            return Ok(match self.whole {
-                true => Outcome::Stopped { messages },
-                false => Outcome::Identical { messages },
+            return Ok(match self.interrupt {
+                Some(interrupt) if seen + 1 >= interrupt => Outcome::Interrupted { messages },
+                _ if self.whole => Outcome::Stopped { messages },
+                _ => Outcome::Identical { messages },
             });
         }
         // All that came was as recorded; an error is then the recorded run's own, unless messages are missing.
-        match self.lines.range(messages + 1..).next() {
+        match self.lines.iter().find(|(seq, _)| !state.compared.contains(seq)) {
             Some((&seq, line)) => {
                 let replayed = ended.err().map(|error| format!("{error:#}"));
                 let recorded = Some(line.clone());

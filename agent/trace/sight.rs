@@ -1,10 +1,15 @@
 //! What the cameras saw: each frame of a run with what perception and memory made of it.
 
+mod odds;
+
+pub use odds::{Odds, odds};
+
 use super::run_file::{Entry, RunFile};
 use acm_concept::{
     camera::FrameHeader,
     ids::{FrameId, ObjectId},
     object::Visibility,
+    pose::Pose,
 };
 use acm_memory::observation::Grounding;
 use glam::DVec3;
@@ -46,6 +51,8 @@ pub struct Seen {
     pub confidence: f64,
     /// First column, first row, last column, last row; pixels of the whole frame.
     pub bounds: [u32; 4],
+    /// Where its main part is, world frame, metres.
+    pub at: Option<DVec3>,
 }
 
 #[derive(Deserialize)]
@@ -77,6 +84,15 @@ struct SeenObject {
     category: String,
     confidence: f64,
     support: Bounds,
+    parts: Vec<SeenPart>,
+}
+#[derive(Deserialize)]
+struct SeenPart {
+    pose: SeenPose,
+}
+#[derive(Deserialize)]
+struct SeenPose {
+    pose: Pose,
 }
 #[derive(Deserialize)]
 struct Bounds {
@@ -100,15 +116,8 @@ pub fn sights(run: &RunFile) -> BTreeMap<FrameId, Sight> {
         match entry.header.kind.as_str() {
             "frame" => {
                 let Some(FrameBody { header }) = body(entry) else { continue };
-                let sight = Sight {
-                    seq: entry.header.seq,
-                    updated: None,
-                    seen: Vec::new(),
-                    expected: Vec::new(),
-                    blindness: None,
-                    same_as: same_as.get(&header.id).copied(),
-                    header,
-                };
+                let same_as = same_as.get(&header.id).copied();
+                let sight = Sight { same_as, ..Sight::new(header, entry.header.seq) };
                 sights.insert(sight.header.id, sight);
             }
             "percepts" => {
@@ -154,6 +163,12 @@ fn body<T: for<'a> Deserialize<'a>>(entry: &Entry) -> Option<T> {
 }
 
 impl Sight {
+    /// A frame of which nothing is known but that a message brought it.
+    fn new(header: FrameHeader, seq: u64) -> Sight {
+        let (seen, expected) = (Vec::new(), Vec::new());
+        Sight { header, seq, updated: None, seen, expected, blindness: None, same_as: None }
+    }
+
     fn take(&mut self, percepts: SeenPercepts) {
         self.blindness = percepts.blindness;
         self.expected = percepts.expected.into_iter().map(|view| (view.object, view.visibility)).collect();
@@ -163,6 +178,7 @@ impl Sight {
             category: object.category,
             confidence: object.confidence,
             bounds: object.support.bounds,
+            at: object.parts.first().map(|part| part.pose.pose.translation),
         };
         self.seen = percepts.objects.into_iter().map(seen).collect();
     }
@@ -209,7 +225,7 @@ pub fn visibility_word(visibility: Visibility) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use acm_concept::{camera::Intrinsics, pose::Pose, time::Time};
+    use acm_concept::{camera::Intrinsics, time::Time};
 
     #[test]
     fn a_place_is_boxed_where_the_camera_sees_it() {
@@ -220,15 +236,7 @@ mod tests {
             intrinsics: Intrinsics { width: 200, height: 100, fx: 100.0, fy: 100.0, cx: 99.5, cy: 49.5 },
             camera_pose: Pose::from_translation(DVec3::new(0.0, 0.0, -2.0)),
         };
-        let sight = Sight {
-            header,
-            seq: 1,
-            updated: None,
-            seen: Vec::new(),
-            expected: Vec::new(),
-            blindness: None,
-            same_as: None,
-        };
+        let sight = Sight::new(header, 1);
         // Two metres ahead six centimetres are three pixels.
         assert_eq!(sight.around(DVec3::ZERO), Some([97, 47, 103, 53]));
         assert_eq!(sight.around(DVec3::new(0.0, 0.0, -3.0)), None);

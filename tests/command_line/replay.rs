@@ -171,6 +171,23 @@ fn an_order_that_is_not_the_runs_own_is_caught_and_located() {
     assert!(told.contains(&format!("message {seq}")), "{told}");
 }
 
+/// What the journal of a run looks like that somebody ended from outside: nothing makes a replay end at the same instant.
+#[test]
+fn a_run_that_was_interrupted_is_replayed_up_to_there() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("interrupted.mcap");
+    rewritten(&runs().full, &path, |message| {
+        if message.channel.schema == "acm.Message" && message.sequence == 901 {
+            let mut record: serde_json::Value = serde_json::from_slice(&message.data).unwrap();
+            let (from, kind, body) = ("outside".into(), "interrupt".into(), serde_json::Value::Null);
+            (record["from"], record["kind"], record["body"]) = (from, kind, body);
+            message.data = serde_json::to_vec(&record).unwrap();
+        }
+    });
+    let told = prints(&["trace", "replay", text(&path)]);
+    assert_eq!(told, "identical up to message 900, where the run was interrupted by hand\n");
+}
+
 #[test]
 fn a_cut_trace_is_repaired_up_to_its_last_whole_message() {
     let dir = tempfile::tempdir().unwrap();

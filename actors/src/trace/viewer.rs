@@ -146,13 +146,6 @@ impl CameraChannels {
     }
 }
 
-/// The bytes of an image that a trace keeps in full, row by row without gaps.
-pub fn read_image(bytes: &[u8]) -> Option<Vec<u8>> {
-    let image = RawImage::decode(bytes).ok()?;
-    let rows = image.height as usize * image.step as usize;
-    (rows == image.data.len()).then(|| image.data.to_vec())
-}
-
 /// The line that a trace's `/log` channel has for a message: the message's number and the text.
 pub fn read_line(bytes: &[u8]) -> Option<(u64, String)> {
     let line = Log::decode(bytes).ok()?;

@@ -139,10 +139,10 @@ fn text(message: &Message) -> String {
 fn decision_words(decision: &Decision) -> String {
     match decision {
         Decision::Act { step, explanation } => format!("{step}; plan: {}", explanation.plan.join(" > ")),
-        Decision::Look { reason } => format!("look again: {reason}"),
-        Decision::SubtaskDone { index, reason } => format!("subtask {} is done: {reason}", index + 1),
+        Decision::Look { reason, .. } => format!("look again: {reason}"),
+        Decision::SubtaskDone { index, reason, .. } => format!("subtask {} is done: {reason}", index + 1),
         Decision::Done { reason } => format!("all is done: {reason}"),
-        Decision::GiveUp { unknown } => format!("give up: {unknown}"),
+        Decision::GiveUp { unknown, .. } => format!("give up: {unknown}"),
     }
 }
 

@@ -1,11 +1,12 @@
 //! What the page tells of each step: the decision, the plan, what was considered, what came of it, and why.
 
 use crate::trace::{
-    decision::{self, Act, Decided, StepSpan},
+    decision::{self, StepSpan},
     run_file::RunFile,
     why::{Inquiry, Why},
 };
 use acm_concept::literal::{Belief, Literal};
+use acm_planner::{Decision, Explanation};
 use serde::Serialize;
 
 /// A step.
@@ -61,15 +62,21 @@ pub fn steps(run: &RunFile, inquiry: &Inquiry<'_>) -> anyhow::Result<Vec<Step>> 
     let decided = inquiry.steps().iter().filter_map(|span| Some((span, span.decision(run)?)));
     let mut steps = Vec::new();
     for (span, entry) in decided {
-        let Decided::Act(act) = Decided::read(entry)? else { continue };
+        let Decision::Act { step, explanation } = decision::read(entry)? else { continue };
         let seq = entry.header.seq;
-        steps.push(step(span, run, &act, (seq, entry.seconds()), inquiry.why(seq)?));
+        steps.push(told(span, run, (&step, &explanation), (seq, entry.seconds()), inquiry.why(seq)?));
     }
     Ok(steps)
 }
 
-fn step(span: &StepSpan, run: &RunFile, act: &Act, (seq, t): (u64, f64), why: Why) -> Step {
-    let (explanation, prediction) = (&act.explanation, &act.step.prediction);
+fn told(
+    span: &StepSpan,
+    run: &RunFile,
+    (step, explanation): (&acm_planner::Step, &Explanation),
+    (seq, t): (u64, f64),
+    why: Why,
+) -> Step {
+    let prediction = &step.prediction;
     let verdict = span.verdict(run);
     let effect = |(literal, probability): &(Literal, f64)| {
         let found = verdict.iter().flat_map(|verdict| &verdict.literals).find(|found| found.literal == *literal);
@@ -94,7 +101,7 @@ fn step(span: &StepSpan, run: &RunFile, act: &Act, (seq, t): (u64, f64), why: Wh
         seq,
         last: span.last_seq(run),
         t,
-        title: act.step.to_string(),
+        title: step.to_string(),
         failure: span.failure(run),
         outcome: verdict.as_ref().map(|verdict| decision::outcome_word(verdict.outcome)),
         goal: explanation.goal.clone(),

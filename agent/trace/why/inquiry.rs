@@ -3,7 +3,7 @@
 use super::{Kind, Link, Node, Why};
 use crate::trace::{
     belief::Beliefs,
-    decision::{self, Act, Decided, StepSpan},
+    decision::{self, StepSpan},
     run_file::{Entry, RunFile},
     sight::{self, Sight},
 };
@@ -12,7 +12,7 @@ use acm_concept::{
     literal::{Belief, Literal, Place, Term},
 };
 use acm_memory::query::Recall;
-use acm_planner::ResolvedReference;
+use acm_planner::{Decision, Explanation, Grounds, ResolvedReference, Step};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Most hits of a retrieval whose entries are followed.
@@ -106,7 +106,7 @@ impl<'a> Answer<'a> {
     fn decision(&mut self, decided: &'a Entry) -> anyhow::Result<()> {
         let seq = decided.header.seq;
         let id = format!("d{seq}");
-        let decision = Decided::read(decided)?;
+        let decision = decision::read(decided)?;
         let from = format!("m{seq}");
         let step = self.all.step_of.get(&seq).copied();
         self.why.step = step.map(|index| index + 1);
@@ -116,11 +116,12 @@ impl<'a> Answer<'a> {
         self.instruction(&id, decided);
         self.losses(&id, seq);
         match decision {
-            Decided::Act(act) => self.act(&id, seq, &act),
-            Decided::Look { reason } | Decided::SubtaskDone { reason, .. } | Decided::Done { reason } => {
-                self.named(&id, seq, &reason);
+            Decision::Act { step, explanation } => self.act(&id, seq, &step, &explanation),
+            Decision::Look { reason, grounds } | Decision::SubtaskDone { reason, grounds, .. } => {
+                self.grounds(&id, seq, &reason, &grounds);
             }
-            Decided::GiveUp { unknown } => self.named(&id, seq, &unknown.text),
+            Decision::GiveUp { unknown, grounds } => self.grounds(&id, seq, &unknown.text, &grounds),
+            Decision::Done { reason } => self.grounds(&id, seq, &reason, &Grounds::default()),
         }
         if let Some(span) = step.and_then(|index| self.all.steps.get(index)) {
             self.outcome(&id, span);
@@ -151,8 +152,7 @@ impl<'a> Answer<'a> {
         }
     }
 
-    fn act(&mut self, id: &str, seq: u64, act: &Act) {
-        let explanation = &act.explanation;
+    fn act(&mut self, id: &str, seq: u64, step: &Step, explanation: &Explanation) {
         for (index, reference) in explanation.references.iter().enumerate() {
             self.reference(id, seq, index, reference);
         }
@@ -170,7 +170,7 @@ impl<'a> Answer<'a> {
                 self.belief(&name, seq, &format!("b{seq}.x{index}"), "failed precondition", failed);
             }
         }
-        let part = act.step.candidate.part.object;
+        let part = step.candidate.part.object;
         self.entry(id, seq, part, "acts on");
     }
 
@@ -227,8 +227,14 @@ impl<'a> Answer<'a> {
         self.evidence(name, seq, &objects, &belief.evidence);
     }
 
-    /// A decision that explains itself in words alone: what the words name.
-    fn named(&mut self, id: &str, seq: u64, words: &str) {
+    /// A decision that is not to act: what it rests on, what its words name beside that, and the last frame before it.
+    fn grounds(&mut self, id: &str, seq: u64, words: &str, grounds: &Grounds) {
+        for (index, reference) in grounds.references.iter().enumerate() {
+            self.reference(id, seq, index, reference);
+        }
+        for (index, pair) in grounds.literals.iter().enumerate() {
+            self.belief(id, seq, &format!("b{seq}.{index}"), "weighed", pair);
+        }
         let names = words.split(|sign: char| !sign.is_ascii_alphanumeric());
         let objects: BTreeSet<ObjectId> = names.filter_map(|name| name.parse().ok()).collect();
         for object in objects {
@@ -265,12 +271,11 @@ impl<'a> Answer<'a> {
     }
 }
 
-fn decision_words(decision: &Decided, step: Option<usize>, steps: usize) -> (String, Vec<String>) {
+fn decision_words(decision: &Decision, number: Option<usize>, steps: usize) -> (String, Vec<String>) {
     match decision {
-        Decided::Act(act) => {
-            let prediction = &act.step.prediction;
-            let number = step.map_or_else(String::new, |step| format!("step {step} of {steps}: "));
-            let explanation = &act.explanation;
+        Decision::Act { step, explanation } => {
+            let prediction = &step.prediction;
+            let number = number.map_or_else(String::new, |number| format!("step {number} of {steps}: "));
             let mut lines = vec![
                 format!("goal: {}", explanation.goal),
                 format!("asked for by \"{}\"", explanation.subtask),
@@ -281,12 +286,14 @@ fn decision_words(decision: &Decided, step: Option<usize>, steps: usize) -> (Str
                 ),
             ];
             lines.extend(explanation.notes.iter().map(|note| format!("note: {note}")));
-            (format!("{number}{}", act.step), lines)
+            (format!("{number}{step}"), lines)
         }
-        Decided::Look { reason } => (format!("look again: {reason}"), Vec::new()),
-        Decided::SubtaskDone { index, reason } => (format!("subtask {} is done: {reason}", index + 1), Vec::new()),
-        Decided::Done { reason } => (format!("all is done: {reason}"), Vec::new()),
-        Decided::GiveUp { unknown } => (format!("give up ({}): {}", unknown.cause.word(), unknown.text), Vec::new()),
+        Decision::Look { reason, .. } => (format!("look again: {reason}"), Vec::new()),
+        Decision::SubtaskDone { index, reason, .. } => (format!("subtask {} is done: {reason}", index + 1), Vec::new()),
+        Decision::Done { reason } => (format!("all is done: {reason}"), Vec::new()),
+        Decision::GiveUp { unknown, .. } => {
+            (format!("give up ({}): {}", unknown.cause.word(), unknown.text), Vec::new())
+        }
     }
 }
 

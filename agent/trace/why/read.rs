@@ -5,7 +5,7 @@ use crate::trace::{
     belief::{self, Change},
     decision,
     run_file::Delta,
-    sight::{self, Sight},
+    sight::{self, Odds, Sight},
 };
 use acm_concept::{
     ids::{FrameId, ObjectId},
@@ -15,6 +15,8 @@ use std::collections::BTreeSet;
 
 /// Most changes of an object that are told beside those that something rests on.
 const MAX_CHANGES: usize = 6;
+/// Most frames that are named against another.
+const MAX_FRAMES: usize = 6;
 
 impl Answer<'_> {
     /// What something rests on: frames and own moves are followed, conclusions stand in the words already.
@@ -118,6 +120,7 @@ impl Answer<'_> {
         let title = format!("{name} of {}, {width}x{height}", header.camera);
         let mut lines: Vec<String> = sight.blindness.iter().map(|why| format!("shows nothing: {why}")).collect();
         lines.extend(sight.same_as.map(|first| format!("bit for bit the picture of {first}")));
+        lines.extend(sight::odds(&self.all.sights, frame).as_ref().map(odds_words));
         self.node(&name, Kind::Frame, Some(sight.seq), title, lines);
         self.link(id, &name, "seen in");
         let crops: Vec<Crop> = objects.iter().map(|object| self.crop(sight, *object)).collect();
@@ -174,4 +177,21 @@ impl Answer<'_> {
             }
         }
     }
+}
+
+/// What speaks against a frame.
+fn odds_words(odds: &Odds) -> String {
+    let frames: Vec<String> = odds.frames.iter().take(MAX_FRAMES).map(FrameId::to_string).collect();
+    let more = odds.frames.len().saturating_sub(MAX_FRAMES);
+    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+    let [x, y, z] = odds.by.to_array().map(|metres| 1e3 * metres);
+    let (things, of) = odds.things;
+    let agree = match odds.agree {
+        0 => "no frame agrees with it".to_owned(),
+        agree => format!("{agree} agree with it"),
+    };
+    format!(
+        "AT ODDS with {}{more}: there {things} of {of} things lie ({x:.0}, {y:.0}, {z:.0}) mm from where it shows them; {agree}",
+        frames.join(", ")
+    )
 }

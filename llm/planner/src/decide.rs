@@ -2,7 +2,7 @@
 
 use crate::{
     decision::{Decision, GiveUpCause, PlanOptions, Situation, Step, Unknown},
-    explanation::{Explanation, step_words},
+    explanation::{Explanation, Grounds, step_words},
     ground::{Grounder, Stuck, missing},
     lexicon::Lexicon,
     search::{Found, Limits, Want, search},
@@ -18,7 +18,7 @@ use acm_memory::{
     entry::{Presence, Transition, TransitionResult},
     query::{Applicability, PlaceReference, Recall},
 };
-use std::collections::BTreeMap;
+use std::{cell::RefCell, collections::BTreeMap};
 
 /// Looks in a row before the agent acts on what it has, or gives up.
 pub(crate) const MAX_LOOKS: u32 = 3;
@@ -42,13 +42,15 @@ pub(crate) fn decide(
         return Decision::Done { reason: format!("all {} subtasks are done", task.subtasks.len()) };
     };
     let may_look = situation.looks < MAX_LOOKS;
-    let mind =
-        Mind { ground: Grounder::new(lexicon, task, view, options, may_look), view, situation, options, current };
+    let ground = Grounder::new(lexicon, task, view, options, may_look);
+    let mind = Mind { ground, weighed: RefCell::default(), view, situation, options, current };
     mind.decide(task, subtask).unwrap_or_else(|stuck| mind.look_or_give_up(stuck))
 }
 
 struct Mind<'a> {
     ground: Grounder<'a>,
+    /// Literals on which the decision hangs, with what is believed of them.
+    weighed: RefCell<Vec<(Literal, Belief)>>,
     view: &'a dyn MemoryView,
     situation: &'a Situation,
     options: &'a PlanOptions,
@@ -70,14 +72,15 @@ impl Mind<'_> {
         self.see()?;
         self.look_ahead(task)?;
         let goal = self.ground_goal(task, &subtask.goal)?;
+        self.weigh(&goal.literal);
         let (literal, belief) = &goal.literal;
         match belief.truth {
             Truth::Yes => {
                 let reason = format!("{literal}: {}", belief.reason);
-                return Ok(Decision::SubtaskDone { index: self.current, reason });
+                return Ok(Decision::SubtaskDone { index: self.current, reason, grounds: self.grounds() });
             }
             Truth::Unknown if self.situation.looks < MAX_LOOKS => {
-                return Ok(Decision::Look { reason: format!("I cannot tell whether {literal}: {}", belief.reason) });
+                return Ok(self.look(format!("I cannot tell whether {literal}: {}", belief.reason)));
             }
             Truth::Unknown | Truth::No => {}
         }
@@ -87,9 +90,21 @@ impl Mind<'_> {
 
     fn look_or_give_up(&self, stuck: Stuck) -> Decision {
         if stuck.look && self.situation.looks < MAX_LOOKS {
-            return Decision::Look { reason: stuck.unknown.text };
+            return self.look(stuck.unknown.text);
         }
-        Decision::GiveUp { unknown: stuck.unknown }
+        Decision::GiveUp { unknown: stuck.unknown, grounds: self.grounds() }
+    }
+
+    fn look(&self, reason: String) -> Decision {
+        Decision::Look { reason, grounds: self.grounds() }
+    }
+
+    fn weigh(&self, literal: &(Literal, Belief)) {
+        self.weighed.borrow_mut().push(literal.clone());
+    }
+
+    fn grounds(&self) -> Grounds {
+        Grounds { references: self.ground.found(), literals: self.weighed.take() }
     }
 
     fn see(&self) -> Result<(), Stuck> {
@@ -119,8 +134,9 @@ impl Mind<'_> {
                 if will_be_known {
                     continue;
                 }
-                if let Recall::Unknown { reason, .. } = self.ground.recall(of.value, *reference, index as u32) {
-                    return Err(self.ground.unknown_past(*object, of.value, *reference, &reason));
+                let recall = self.ground.recall(of.value, *reference, index as u32);
+                if let Recall::Unknown { .. } = recall {
+                    return Err(self.ground.unknown_past(*object, of.value, *reference, recall));
                 }
             }
             if subtask.goal.moves()
@@ -204,14 +220,16 @@ impl Mind<'_> {
         let (limits, last_failure) = self.limits(goal.times);
         let found = search(self.view, std::slice::from_ref(&goal.want), &limits);
         let Some(first) = found.steps.first().cloned() else {
+            found.rejected.iter().filter_map(|rejected| rejected.failed.as_ref()).for_each(|failed| self.weigh(failed));
             return Err(no_plan(goal, &found, last_failure));
         };
-        if let Some((literal, belief)) = found.assumed.first()
+        if let Some(assumed) = found.assumed.first()
             && self.situation.looks < MAX_LOOKS
         {
+            self.weigh(assumed);
+            let (literal, belief) = assumed;
             let words = step_words(&first);
-            let reason = format!("{words} needs {literal}, and I cannot tell: {}", belief.reason);
-            return Ok(Decision::Look { reason });
+            return Ok(self.look(format!("{words} needs {literal}, and I cannot tell: {}", belief.reason)));
         }
         let tried = (first.skill.clone(), first.part.object);
         let step = Step {

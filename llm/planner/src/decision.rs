@@ -1,6 +1,6 @@
 //! What the planner is told of the moment, and what it answers.
 
-use crate::explanation::Explanation;
+use crate::explanation::{Explanation, Grounds};
 use acm_concept::{embodiment::Feedback, skill::FailureCause, task::OnUnknown, time::Time};
 use acm_memory::query::{Prediction, SkillCandidate};
 use serde::{Deserialize, Serialize};
@@ -37,7 +37,7 @@ impl Default for PlanOptions {
 }
 
 /// What to do next.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[allow(
     clippy::large_enum_variant,
@@ -55,6 +55,9 @@ pub enum Decision {
     Look {
         /// What the look is for.
         reason: String,
+        /// What it rests on.
+        #[serde(default)]
+        grounds: Grounds,
     },
     /// The current subtask is done; memory should note it.
     SubtaskDone {
@@ -62,6 +65,9 @@ pub enum Decision {
         index: u32,
         /// Why it counts as done.
         reason: String,
+        /// What it rests on.
+        #[serde(default)]
+        grounds: Grounds,
     },
     /// The whole instruction is done.
     Done {
@@ -72,6 +78,9 @@ pub enum Decision {
     GiveUp {
         /// What is not known or not possible.
         unknown: Unknown,
+        /// What it rests on.
+        #[serde(default)]
+        grounds: Grounds,
     },
 }
 

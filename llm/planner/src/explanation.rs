@@ -31,6 +31,15 @@ pub struct Explanation {
     pub notes: Vec<String>,
 }
 
+/// What a decision that is not to act rests on.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Grounds {
+    /// What the instruction's phrases were taken to mean.
+    pub references: Vec<ResolvedReference>,
+    /// Goals and preconditions that were weighed, with what memory believes of them.
+    pub literals: Vec<(Literal, Belief)>,
+}
+
 /// What a phrase was taken to mean, and on what grounds.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ResolvedReference {

@@ -28,7 +28,7 @@ pub mod task;
 
 pub use bind::BindError;
 pub use decision::{Decision, GiveUpCause, PlanOptions, Situation, Step, Unknown};
-pub use explanation::{Explanation, Rejected, ResolvedReference};
+pub use explanation::{Explanation, Grounds, Rejected, ResolvedReference};
 pub use language::ParseError;
 pub use lexicon::{Lexicon, LexiconError};
 pub use planner::{Planner, embedded_lexicon};

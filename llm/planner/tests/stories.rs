@@ -22,7 +22,7 @@ fn abstain() -> acm_planner::PlanOptions {
 
 fn given_up(decision: &Decision) -> (GiveUpCause, &str) {
     match decision {
-        Decision::GiveUp { unknown } => (unknown.cause, unknown.text.as_str()),
+        Decision::GiveUp { unknown, .. } => (unknown.cause, unknown.text.as_str()),
         other => panic!("expected to give up, got {other:?}"),
     }
 }

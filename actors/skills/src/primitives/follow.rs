@@ -26,8 +26,6 @@ const MOST_YIELDING_M: f64 = 0.06;
 const PROGRESS_M: f64 = 0.001;
 const PROGRESS_RAD: f64 = 0.01;
 const BLOCKED_S: f64 = 0.8;
-/// A part that is so far ahead of the hand falls, and the hand cannot hold it: it lets go rather than be dragged; metres.
-const RUNAWAY_M: f64 = 0.06;
 /// The command may run ahead of the hand by this, metres and radians.
 const LEAD_M: f64 = 0.005;
 const LEAD_RAD: f64 = 0.1;
@@ -307,11 +305,6 @@ impl Follow {
                 .failed(format!("the part led the hand {off_mm:.0} mm off the way that its joint should leave it"));
         }
         self.remember(at);
-        let ahead_m = (self.reached - self.commanded) * self.lever;
-        if ahead_m > RUNAWAY_M && !self.in_place {
-            let pulled_n = force.length();
-            return self.failed(format!("the part ran {:.0} mm ahead with {pulled_n:.0} N: let go", 1e3 * ahead_m));
-        }
         let lead = if self.in_place { LEAD_RAD } else { LEAD_M / self.lever + self.heavy };
         if let Some(step) = self.check_progress(hand, at, resisting_n, lead) {
             return step;

@@ -26,6 +26,7 @@ const TIPS_M: f64 = 0.016;
 /// Half of the palm's sides, metres; and how far the fingers reach beyond it.
 const PALM_M: DVec2 = DVec2::new(0.108, 0.038);
 const FINGERS_M: f64 = 0.04;
+
 /// A box, aligned with the thing's axes when all is shut, in coordinates along right, up and out of a front.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Piece {

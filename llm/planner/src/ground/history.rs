@@ -92,8 +92,8 @@ impl Grounder<'_> {
             Recall::Known { value, confidence, .. } => {
                 (*value, format!("remembered with confidence {confidence:.2}"), false)
             }
-            Recall::Unknown { reason, .. } if self.options.on_unknown == OnUnknown::Abstain => {
-                return Err(self.unknown_past(index, object, reference, reason));
+            Recall::Unknown { .. } if self.options.on_unknown == OnUnknown::Abstain => {
+                return Err(self.unknown_past(index, object, reference, recall));
             }
             Recall::Unknown { reason, candidates } => {
                 if let Some(place) = self.drawn_before(object, subtask) {
@@ -103,7 +103,7 @@ impl Grounder<'_> {
                 let fraction: f64 = self.draw(subtask, index).random();
                 match choose(&candidates, fraction) {
                     Some(place) => (place, format!("drawn among {} places: {reason}", candidates.len()), true),
-                    None => return Err(self.unknown_past(index, object, reference, reason)),
+                    None => return Err(self.unknown_past(index, object, reference, recall)),
                 }
             }
         };
@@ -127,16 +127,29 @@ impl Grounder<'_> {
         self.view.transitions().iter().rev().filter(of_subtask).find_map(|t| t.report.invocation.destination)
     }
 
-    /// The sentence for a past that memory does not hold.
+    /// The sentence for a past that memory does not hold; its answer is kept with what was found.
     pub fn unknown_past(
         &self,
         index: ReferenceIndex,
         object: ObjectId,
         reference: PlaceReference,
-        reason: &str,
+        recall: Recall<Place>,
     ) -> Stuck {
+        let reason = match &recall {
+            Recall::Unknown { reason, .. } => reason.as_str(),
+            Recall::Known { .. } => "memory does not decide",
+        };
         let name = format!("{} ({object})", self.phrase(index));
         let text = format!("I do not know {}: {reason}", history_phrase(reference, &name));
+        self.keep(ResolvedReference {
+            phrase: history_phrase(reference, self.phrase(index)),
+            object: Some(object),
+            place: None,
+            retrieval: None,
+            recall: Some(recall),
+            how: "not known".into(),
+            guessed: false,
+        });
         Stuck::give_up(GiveUpCause::Memory, text)
     }
 
