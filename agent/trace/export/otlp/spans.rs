@@ -4,9 +4,10 @@
 //! lie within each other as the work did.
 
 use crate::trace::{
-    decision::{self, Decided},
+    decision,
     run_file::{Entry, RunFile},
 };
+use acm_planner::Decision;
 use std::{cmp::Reverse, collections::BTreeMap};
 
 /// A question of one actor to another, by the kinds of its messages.
@@ -152,7 +153,7 @@ fn subtasks(run: &RunFile, last: u64) -> Vec<Interval> {
             found.extend(open.and_then(|open| subtask(&texts, open, seq, false)));
             (texts, open) = (read, Some((seq, 0)));
         } else if entry.header.kind == "decided"
-            && let Ok(Decided::SubtaskDone { index, .. }) = Decided::read(entry)
+            && let Ok(Decision::SubtaskDone { index, .. }) = decision::read(entry)
         {
             found.extend(open.and_then(|open| subtask(&texts, open, seq, true)));
             open = Some((seq, index as usize + 1));
