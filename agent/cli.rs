@@ -114,10 +114,9 @@ impl FromStr for Seeds {
 }
 
 /// What the agent does when memory cannot decide.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum OnUnknownArg {
     /// Give up and say what is not known.
-    #[default]
     Abstain,
     /// Draw one of the candidates.
     Guess,
@@ -153,9 +152,12 @@ pub struct RunArgs {
     /// The memory: acm, paper-identity, reactive, first-frame.
     #[arg(long, default_value = "acm")]
     pub method: String,
-    /// What to do when memory cannot decide.
-    #[arg(long, value_enum, default_value_t)]
-    pub on_unknown: OnUnknownArg,
+    /// What to do when memory cannot decide: abstain if neither this nor the configuration says.
+    #[arg(long, value_enum)]
+    pub on_unknown: Option<OnUnknownArg>,
+    /// What the agent goes by: a TOML file, such as `[perception]` with `min_confidence = 0.3`.
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
     /// Give this instruction instead of the scenario's own.
     #[arg(long)]
     pub instruction: Option<String>,
@@ -208,7 +210,7 @@ impl RunArgs {
         option("robot", self.robot.as_ref().map(ToString::to_string));
         option("until", self.until.map(|until| until.to_string()));
         option("method", Some(self.method.clone()));
-        let on_unknown = self.on_unknown.to_possible_value();
+        let on_unknown = self.on_unknown.and_then(|on_unknown| on_unknown.to_possible_value());
         option("on-unknown", on_unknown.map(|value| value.get_name().to_owned()));
         option("instruction", self.instruction.clone());
         option("library", self.library.as_ref().map(path));

@@ -1,14 +1,11 @@
 //! Faults that can be put between the agent and its world.
 
-use acm_actors::episode::WipeAt;
+use acm_actors::{episode::WipeAt, settings::Signal};
 use acm_concept::camera::{CameraError, CameraModel, CameraSource, RgbdFrame};
 use std::{
     fmt,
     str::FromStr,
-    sync::{
-        Arc, Mutex, PoisonError,
-        atomic::{AtomicBool, Ordering},
-    },
+    sync::{Arc, Mutex, PoisonError},
 };
 
 /// By how much a misplaced frame's camera is said to stand aside where the fault does not say it, millimetres.
@@ -60,6 +57,13 @@ impl FromStr for Misplaced {
         let aside_mm =
             aside_mm.ok_or(format!("a camera is misplaced by 1 to {MAX_ASIDE_MM} mm: misplaced-frame@1:50"))?;
         Ok(Misplaced { frame, aside_mm })
+    }
+}
+
+impl Injection {
+    /// Whether it befalls the cameras.
+    pub fn is_of_cameras(&self) -> bool {
+        matches!(self, Injection::BlackFrames | Injection::FreezeFrames | Injection::MisplacedFrame(_))
     }
 }
 
@@ -130,33 +134,7 @@ pub struct Faults {
     pub drop_at: Option<u32>,
     /// See [`Injection::Panic`].
     pub panic_at: Option<(String, u64)>,
-    /// Where the faults of the cameras begin; at once if nothing says when.
-    pub cameras_from: Option<Signal>,
 }
-
-/// Something that is to happen once another thing has happened.
-#[derive(Debug, Clone, Default)]
-pub struct Signal(Arc<AtomicBool>);
-
-impl Signal {
-    /// It has happened.
-    pub fn give(&self) {
-        self.0.store(true, Ordering::SeqCst);
-    }
-    /// Whether it has.
-    pub fn is_given(&self) -> bool {
-        self.0.load(Ordering::SeqCst)
-    }
-}
-
-impl PartialEq for Signal {
-    /// Two handles of one signal.
-    fn eq(&self, other: &Signal) -> bool {
-        Arc::ptr_eq(&self.0, &other.0)
-    }
-}
-
-impl Eq for Signal {}
 
 impl Faults {
     /// Sorts faults; of two that exclude each other the later one holds.
@@ -175,12 +153,12 @@ impl Faults {
         }
         faults
     }
-    /// Puts the camera faults in front of a camera.
-    pub fn cameras(&self, cameras: Box<dyn CameraSource>) -> Box<dyn CameraSource> {
+    /// Puts the camera faults in front of a camera: from the first frame on, or from a signal on.
+    pub fn cameras(&self, cameras: Box<dyn CameraSource>, from: Option<Signal>) -> Box<dyn CameraSource> {
         if !self.black_frames && !self.freeze_frames && self.misplaced.is_none() {
             return cameras;
         }
-        Box::new(FaultyCamera { cameras, faults: self.clone(), first: None, given: 0 })
+        Box::new(FaultyCamera { cameras, faults: self.clone(), from, first: None, given: 0 })
     }
 }
 
@@ -236,8 +214,10 @@ impl CameraSource for TappedCamera {
 struct FaultyCamera {
     cameras: Box<dyn CameraSource>,
     faults: Faults,
+    /// Where they begin; at once if nothing says when.
+    from: Option<Signal>,
     first: Option<RgbdFrame>,
-    /// Frames given so far.
+    /// Frames given since they began.
     given: u32,
 }
 
@@ -247,14 +227,14 @@ impl CameraSource for FaultyCamera {
     }
     fn capture(&mut self, camera: &str) -> Result<RgbdFrame, CameraError> {
         let mut frame = self.cameras.capture(camera)?;
-        self.given += 1;
-        if let Some(misplaced) = self.faults.misplaced.filter(|misplaced| misplaced.frame == self.given) {
-            frame.header.camera_pose.translation.x += 1e-3 * f64::from(misplaced.aside_mm);
-        }
-        if self.faults.cameras_from.as_ref().is_some_and(|from| !from.is_given()) {
+        if self.from.as_ref().is_some_and(|from| !from.is_given()) {
             // Frozen is the last picture before the fault.
             self.first = Some(frame.clone());
             return Ok(frame);
+        }
+        self.given += 1;
+        if let Some(misplaced) = self.faults.misplaced.filter(|misplaced| misplaced.frame == self.given) {
+            frame.header.camera_pose.translation.x += 1e-3 * f64::from(misplaced.aside_mm);
         }
         if self.faults.black_frames {
             frame.color = vec![0; frame.color.len()].into();
@@ -303,7 +283,7 @@ mod tests {
 
     #[test]
     fn only_the_one_frame_is_said_to_stand_aside() {
-        let mut cameras = Faults::new(&["misplaced-frame@2:50".parse().unwrap()]).cameras(Box::new(Counting(0)));
+        let mut cameras = Faults::new(&["misplaced-frame@2:50".parse().unwrap()]).cameras(Box::new(Counting(0)), None);
         let mut stood = |_| cameras.capture("head").map(|frame| frame.header.camera_pose.translation).unwrap();
         let stands = [1, 2, 3].map(&mut stood);
         let nominal = DVec3::new(0.1, 0.2, 0.3);

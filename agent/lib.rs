@@ -3,6 +3,7 @@
 //! | module | holds |
 //! |---|---|
 //! | [`cli`] | the command line and its exit codes |
+//! | [`config`] | what the agent goes by, as a file |
 //! | [`episode`] | one episode: simulator, agent, judge |
 //! | [`run`] | `acm run`: one episode told, or a range of seeds counted |
 //! | [`remote`] | `acm run --robot`: an episode on a robot in another process |
@@ -22,6 +23,7 @@
 
 pub mod bench;
 pub mod cli;
+pub mod config;
 pub mod demo;
 pub mod doctor;
 pub mod embed;

@@ -42,11 +42,12 @@ pub fn run(args: &RunArgs) -> anyhow::Result<Exit> {
     };
     let live = args.live.then(|| Live::new(args.json));
     let journal = listener(args, live.as_ref(), &format!("{} at {address}, frames {frames}", robot.host()))?;
+    let on_unknown = config.settings.on_unknown;
     let result = filmed(&runner, video, config, journal, |config, journal| {
         runner.run_remote(&robot, args.seed.first, config, journal)
     })?;
     drop(live);
-    tell_result(&Source { name: &address.to_string(), sensor: "the host's" }, args, &result)?;
+    tell_result(&Source { name: &address.to_string(), sensor: "the host's", on_unknown }, args, &result)?;
     if let Ending::Broken { reason } = &result.report.ending {
         eprintln!("acm: the run broke off: {reason}");
     }

@@ -2,6 +2,7 @@
 
 use crate::{
     cli::{Exit, RunArgs},
+    config,
     episode::{EpisodeConfig, EpisodeResult, Runner},
     inject::Faults,
     live::Live,
@@ -12,7 +13,7 @@ use crate::{
     video::{Camera, VideoFile},
 };
 use acm_actors::{message::Message, report::Ending};
-use acm_concept::template::TemplateLibrary;
+use acm_concept::{task::OnUnknown, template::TemplateLibrary};
 use acm_runtime::journal::{Both, Journal, NoJournal};
 use acm_sim::Scenario;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -39,9 +40,11 @@ pub fn run(args: &RunArgs) -> anyhow::Result<Exit> {
 
 /// Reads what a run needs beside its world.
 pub(crate) fn prepare(args: &RunArgs) -> anyhow::Result<(EpisodeConfig, TemplateLibrary)> {
+    let mut settings = args.config.as_deref().map(config::read).transpose()?.unwrap_or_default();
+    settings.on_unknown = args.on_unknown.map_or(settings.on_unknown, Into::into);
     let config = EpisodeConfig {
         method: args.method.clone(),
-        on_unknown: args.on_unknown.into(),
+        settings,
         instruction: args.instruction.clone(),
         memory: args.memory.clone(),
         faults: Faults::new(&args.inject),
@@ -71,11 +74,12 @@ fn one(
     let live = args.live.then(|| Live::new(args.json));
     let title = format!("{} seed {}: {}", scenario.name(), args.seed.first, scenario.summary());
     let journal = listener(args, live.as_ref(), &title)?;
+    let source = Source::of(scenario, args, &config);
     let result = filmed(runner, video, config, journal, |config, journal| {
         runner.run(scenario, args.seed.first, config, journal)
     })?;
     drop(live);
-    tell_result(&Source::of(scenario, args), args, &result)?;
+    tell_result(&source, args, &result)?;
     Ok(exit_of(&result))
 }
 
@@ -143,7 +147,7 @@ fn many(runner: &Runner, scenario: &Scenario, args: &RunArgs, config: &EpisodeCo
     }
     bar.finish_and_clear();
     drop(live);
-    let source = Source::of(scenario, args);
+    let source = Source::of(scenario, args, config);
     let runs = Runs::new(&source, args, &results);
     if args.json {
         serde_json::to_writer_pretty(std::io::stdout().lock(), &runs)?;
@@ -328,11 +332,14 @@ pub(crate) struct Source<'a> {
     pub name: &'a str,
     /// The sensor profile.
     pub sensor: &'a str,
+    /// What the agent does when memory cannot decide.
+    pub on_unknown: OnUnknown,
 }
 
 impl<'a> Source<'a> {
-    fn of(scenario: &'a Scenario, args: &'a RunArgs) -> Source<'a> {
-        Source { name: scenario.name(), sensor: args.sensor.as_deref().unwrap_or(scenario.sensor()) }
+    fn of(scenario: &'a Scenario, args: &'a RunArgs, config: &EpisodeConfig) -> Source<'a> {
+        let sensor = args.sensor.as_deref().unwrap_or(scenario.sensor());
+        Source { name: scenario.name(), sensor, on_unknown: config.settings.on_unknown }
     }
 }
 
@@ -366,9 +373,9 @@ impl<'a> Runs<'a> {
             schema: "acm.run/1",
             scenario: source.name,
             method: &args.method,
-            on_unknown: match args.on_unknown {
-                crate::cli::OnUnknownArg::Abstain => "abstain",
-                crate::cli::OnUnknownArg::Guess => "guess",
+            on_unknown: match source.on_unknown {
+                OnUnknown::Abstain => "abstain",
+                OnUnknown::Guess => "guess",
             },
             sensor: source.sensor,
             seeds: [args.seed.first, args.seed.last],

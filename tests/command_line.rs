@@ -3,6 +3,8 @@
 
 #[path = "command_line/chromium.rs"]
 mod chromium;
+#[path = "command_line/debugging.rs"]
+mod debugging;
 #[path = "command_line/demo.rs"]
 mod demo;
 #[path = "command_line/export.rs"]

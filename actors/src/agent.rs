@@ -9,17 +9,18 @@ use crate::{
     perception::PerceptionActor,
     planner::PlannerActor,
     report::EpisodeReport,
+    settings::{Settings, Signal, Turning},
     trace::Trace,
     verifier::VerifierActor,
 };
 use acm_concept::{
     camera::{CameraSource, RgbdFrame},
     embodiment::{Clock, Embodiment},
-    task::{OnUnknown, TaskSpec},
+    task::TaskSpec,
     template::TemplateLibrary,
 };
 use acm_memory::Memory;
-use acm_perception::{Grounder, GrounderConfig};
+use acm_perception::Grounder;
 use acm_planner::{Lexicon, PlanOptions, Planner};
 use acm_runtime::{
     envelope::Role,
@@ -60,9 +61,9 @@ pub enum AgentError {
 pub struct AgentBuilder {
     library: Arc<TemplateLibrary>,
     memory: Arc<Mutex<Box<dyn Memory>>>,
-    on_unknown: OnUnknown,
+    settings: Settings,
+    then: Option<(Signal, Settings)>,
     seed: u64,
-    grounder: GrounderConfig,
     lexicon: Option<Lexicon>,
     journal: Arc<dyn Journal<Message>>,
     trace: Option<Arc<Trace>>,
@@ -72,19 +73,19 @@ pub struct AgentBuilder {
 }
 
 impl AgentBuilder {
-    /// What to do when memory cannot decide.
-    pub fn on_unknown(mut self, on_unknown: OnUnknown) -> Self {
-        self.on_unknown = on_unknown;
+    /// What the agent goes by.
+    pub fn settings(mut self, settings: Settings) -> Self {
+        self.settings = settings;
+        self
+    }
+    /// What it goes by from a signal on.
+    pub fn then(mut self, then: Option<(Signal, Settings)>) -> Self {
+        self.then = then;
         self
     }
     /// Seed of the draws that guessing makes.
     pub fn seed(mut self, seed: u64) -> Self {
         self.seed = seed;
-        self
-    }
-    /// Thresholds of perception.
-    pub fn grounder(mut self, config: GrounderConfig) -> Self {
-        self.grounder = config;
         self
     }
     /// Another lexicon than the one that ships inside the binary.
@@ -156,9 +157,9 @@ impl Agent {
         AgentBuilder {
             library,
             memory: Arc::new(Mutex::new(memory)),
-            on_unknown: OnUnknown::default(),
+            settings: Settings::default(),
+            then: None,
             seed: 0,
-            grounder: GrounderConfig::default(),
             lexicon: None,
             journal: Arc::new(NoJournal),
             trace: None,
@@ -220,10 +221,14 @@ impl Agent {
         let parts = &self.parts;
         let bus: Arc<dyn FrameBus<RgbdFrame>> = Arc::new(InProcessBus::new(BUS_FRAMES));
         let robot = outside.lock().unwrap_or_else(PoisonError::into_inner).embodiment.description().clone();
-        let grounder = Arc::new(Grounder::new(Arc::clone(&parts.library), parts.grounder.clone()));
-        let options = PlanOptions { on_unknown: parts.on_unknown, seed: parts.seed };
+        let settings = Turning::new(parts.settings.clone(), parts.then.clone());
+        let library = Arc::clone(&parts.library);
+        let grounder =
+            settings.clone().map(|settings| Arc::new(Grounder::new(Arc::clone(&library), settings.perception)));
+        let seed = parts.seed;
+        let options = settings.map(|settings| PlanOptions { on_unknown: settings.on_unknown, seed });
         let (memory, wipe_at, until) = (Arc::downgrade(&parts.memory), parts.wipe_at.clone(), parts.until);
-        let (planner, library) = (Arc::clone(&self.planner), Arc::clone(&parts.library));
+        let planner = Arc::clone(&self.planner);
         let (frames, seen, kept) = (Arc::clone(&bus), Arc::clone(&bus), bus);
         let (eyes, hands, plans) = (robot.clone(), robot.clone(), robot);
         let journal: Arc<dyn Journal<Message>> = match &parts.trace {
@@ -239,9 +244,7 @@ impl Agent {
             )
             .actor(
                 PERCEPTION,
-                Box::new(move || {
-                    Box::new(PerceptionActor::new(Arc::clone(&grounder), eyes.clone(), Arc::clone(&seen)))
-                }),
+                Box::new(move || Box::new(PerceptionActor::new(grounder.clone(), eyes.clone(), Arc::clone(&seen)))),
             )
             .actor(
                 MEMORY,
@@ -254,7 +257,7 @@ impl Agent {
                 PLANNER,
                 Box::new(move || {
                     let (planner, library) = (Arc::clone(&planner), Arc::clone(&library));
-                    Box::new(PlannerActor::new(planner, library, plans.clone(), options))
+                    Box::new(PlannerActor::new(planner, library, plans.clone(), options.clone()))
                 }),
             )
             .actor(EXECUTOR, Box::new(move || Box::new(ExecutorActor::new(hands.clone()))))

@@ -1,6 +1,9 @@
 //! The planner actor: reads the instruction and decides what to do next. It keeps nothing between messages.
 
-use crate::message::{EPISODE, Message};
+use crate::{
+    message::{EPISODE, Message},
+    settings::Turning,
+};
 use acm_concept::{embodiment::RobotDescription, template::TemplateLibrary};
 use acm_planner::{Decision, GiveUpCause, Grounds, PlanOptions, Planner, Unknown};
 use acm_runtime::{
@@ -14,7 +17,7 @@ pub struct PlannerActor {
     planner: Arc<Planner>,
     library: Arc<TemplateLibrary>,
     robot: RobotDescription,
-    options: PlanOptions,
+    options: Turning<PlanOptions>,
 }
 
 impl PlannerActor {
@@ -23,7 +26,7 @@ impl PlannerActor {
         planner: Arc<Planner>,
         library: Arc<TemplateLibrary>,
         robot: RobotDescription,
-        options: PlanOptions,
+        options: Turning<PlanOptions>,
     ) -> PlannerActor {
         PlannerActor { planner, library, robot, options }
     }
@@ -37,7 +40,7 @@ impl Core<Message> for PlannerActor {
                 Message::Parsed(task.map(Arc::new).map_err(|error| error.to_string()))
             }
             Message::Decide { task, situation, view } => {
-                let decision = self.planner.decide(&task, &*view.0, &situation, &self.options);
+                let decision = self.planner.decide(&task, &*view.0, &situation, self.options.now());
                 match &decision {
                     Decision::Act { step, .. } => match self.planner.bind(step, &*view.0, &self.robot) {
                         Ok(invocation) => {

@@ -82,10 +82,13 @@ pub struct TraceReplayArgs {
 #[derive(Debug, Clone, Default, Args)]
 #[group(requires = "fork")]
 pub struct Otherwise {
-    /// A further fault. Black and frozen frames begin at the fork.
+    /// A further fault. Those of the cameras begin at the fork, and count frames from there.
     #[arg(long, value_name = "FAULT")]
     pub inject: Vec<Injection>,
-    /// What to do when memory cannot decide.
+    /// What the agent goes by from the fork on: a TOML file, as `acm run --config`.
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// What to do from the fork on when memory cannot decide.
     #[arg(long, value_enum)]
     pub on_unknown: Option<OnUnknownArg>,
     /// A field of the scenario, as `acm run --set`.

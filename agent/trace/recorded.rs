@@ -11,6 +11,7 @@ use acm_actors::{
     host::Outside,
     message::HOST,
     replay::{Answer, outside},
+    settings::Settings,
 };
 use acm_concept::{embodiment::RobotDescription, ids::FrameId, task::TaskSpec, time::Time};
 use acm_runtime::trace::{Item, TraceReader};
@@ -40,6 +41,7 @@ struct Options {
     arguments: Vec<String>,
     #[serde(default)]
     keeps_memory: bool,
+    settings: Option<Settings>,
 }
 
 impl Recorded {
@@ -103,6 +105,14 @@ impl Recorded {
             bail!("the trace does not say how its run was started: it was not started by `acm run`");
         }
         run_arguments(&options.arguments)
+    }
+
+    /// What the agent went by; none in a trace that does not say it.
+    ///
+    /// # Errors
+    /// It is malformed.
+    pub fn settings(&self) -> anyhow::Result<Option<Settings>> {
+        Ok(self.file::<Options>("options.json")?.settings)
     }
 
     /// A folder with the memory that the run began with; `None` where it began with an empty one.

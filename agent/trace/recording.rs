@@ -162,7 +162,7 @@ fn options(world: &str, config: &EpisodeConfig) -> serde_json::Value {
         "scenario": world,
         "arguments": config.arguments,
         "method": config.method,
-        "on_unknown": config.on_unknown,
+        "settings": config.settings,
         "instruction": config.instruction,
         "keeps_memory": config.memory.is_some(),
         "faults": format!("{:?}", config.faults),

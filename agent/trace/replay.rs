@@ -13,10 +13,10 @@ use super::{
 use crate::{
     cli::{Exit, RunArgs, trace::TraceReplayArgs},
     episode::{EpisodeConfig, Runner},
-    inject::{Faults, Signal},
+    inject::Faults,
     run::prepare,
 };
-use acm_actors::{message::Message, trace::words};
+use acm_actors::{message::Message, settings::Signal, trace::words};
 use acm_runtime::{
     envelope::{Envelope, OUTSIDE},
     journal::{Journal, JournalError},
@@ -121,7 +121,11 @@ pub fn replay(recorded: &Recorded, args: &TraceReplayArgs) -> anyhow::Result<Out
     let journal = Arc::clone(&comparison) as Arc<dyn Journal<Message>>;
     let seed = recorded.seed()?;
     let memory = recorded.memory()?;
-    let config = EpisodeConfig { memory: memory.as_ref().map(|folder| folder.path().to_path_buf()), ..config };
+    let config = EpisodeConfig {
+        memory: memory.as_ref().map(|folder| folder.path().to_path_buf()),
+        settings: recorded.settings()?.unwrap_or(config.settings),
+        ..config
+    };
     let (ended, renderer) = if args.resim {
         let name = run.scenario.as_deref().context("the run was on a robot in another process: it has no simulator")?;
         let scenario = Scenario::open_with(name, &run.set)?;

@@ -102,12 +102,12 @@ fn one_call(call: &Call, asked: Option<&Entry>, answer: Option<&Entry>, content:
         entry.and_then(|entry| entry.record().ok()).map(|record| record.body).unwrap_or_default()
     };
     let (question, reply) = (body(asked), body(answer));
-    let mut said = Said {
-        name: call.name.into(),
-        kind: INTERNAL,
-        attributes: vec![Attribute::new("acm.asked", line(asked)), Attribute::new("acm.answered", line(answer))],
-        status: Status::default(),
-    };
+    let mut said = Said { name: call.name.into(), kind: INTERNAL, attributes: Vec::new(), status: Status::default() };
+    // The lines of a chat hold the prompt's words and the reply's.
+    if content || call.operation != Some("chat") {
+        said.put("acm.asked", line(asked));
+        said.put("acm.answered", line(answer));
+    }
     if let Some(operation) = call.operation {
         said.put("gen_ai.operation.name", operation);
     }
@@ -170,9 +170,9 @@ impl Said {
 
     /// A question to a language model.
     fn chat(&mut self, question: &Value, reply: &Value, content: bool) {
-        let request = question.get("request").unwrap_or(question);
-        let answer = reply.get("answer").or_else(|| reply.get("result")).unwrap_or(reply);
-        let said = answer.get("reply").unwrap_or(answer);
+        let none = Value::Null;
+        let request = question.get("request").unwrap_or(&none);
+        let said = reply.get("reply").unwrap_or(&none);
         let (backend, model) = (text(said, "/backend"), text(said, "/model"));
         self.kind = CLIENT;
         self.name = format!("chat {model}").trim_end().to_owned();
@@ -209,7 +209,7 @@ impl Said {
             let output = json!([{ "role": "assistant", "parts": parts(text(said, "/text")), "finish_reason": end }]);
             self.put("gen_ai.output.messages", output.to_string());
         }
-        if let Some(error) = answer.get("error") {
+        if let Some(error) = reply.get("error") {
             self.fails(text(error, "/kind"), &error.to_string());
         }
     }
@@ -243,5 +243,56 @@ fn text_of(value: &Value) -> Option<String> {
         Value::String(text) => Some(text.clone()),
         Value::Number(number) => Some(number.to_string()),
         _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CHAT: Call = Call { asks: "a", answers: "b", name: "chat", operation: Some("chat"), store: None };
+
+    fn entry(body: &Value) -> Option<Entry> {
+        let record = json!({
+            "seq": 4, "cause": 3, "episode": 1, "from": "planner", "to": "llm", "kind": "a", "t": 0, "body": body,
+        });
+        Entry::parse(record.to_string().into_bytes())
+    }
+
+    fn said(reply: &Value, content: bool) -> Said {
+        let question = json!({ "request": {
+            "stage": "parse", "system": "be brief", "parameters": { "max_output_tokens": 900 },
+            "turns": [{ "who": "user", "parts": [{ "text": "secret words" }] }],
+        }});
+        one_call(&CHAT, entry(&question).as_ref(), entry(reply).as_ref(), content)
+    }
+
+    fn value(said: &Said, key: &str) -> Option<AnyValue> {
+        said.attributes.iter().find(|attribute| attribute.key == key).map(|attribute| attribute.value.clone())
+    }
+
+    #[test]
+    fn a_chat_tells_its_model_and_its_tokens_and_its_words_only_if_wanted() {
+        let reply = json!({ "reply": {
+            "text": "secret answer", "reasoning": null, "backend": "ollama", "model": "m-7b", "end": "max-tokens",
+            "usage": { "input": 120, "output": 30, "reasoning": 10, "cached": 0 },
+        }});
+        let quiet = said(&reply, false);
+        assert_eq!((quiet.name.as_str(), quiet.kind, quiet.status.code), ("chat m-7b", CLIENT, 0));
+        assert_eq!(value(&quiet, "gen_ai.provider.name"), Some("ollama".into()));
+        assert_eq!(value(&quiet, "gen_ai.request.max_tokens"), Some(900.into()));
+        assert_eq!(value(&quiet, "gen_ai.usage.input_tokens"), Some(120.into()));
+        assert_eq!(value(&quiet, "gen_ai.response.finish_reasons"), Some(vec![AnyValue::from("length")].into()));
+        assert!(!format!("{quiet:?}").contains("secret"), "{quiet:?}");
+        let told = format!("{:?}", said(&reply, true));
+        assert!(told.contains("secret words") && told.contains("secret answer") && told.contains("be brief"), "{told}");
+    }
+
+    #[test]
+    fn a_model_that_gives_no_reply_is_an_error_of_its_kind() {
+        let failed = said(&json!({ "error": { "kind": "rate-limited", "retry_after_ms": 500 } }), false);
+        assert_eq!((failed.name.as_str(), failed.status.code), ("chat", 2));
+        assert_eq!(value(&failed, "error.type"), Some("rate-limited".into()));
+        assert_eq!(value(&failed, "gen_ai.response.model"), None);
     }
 }
