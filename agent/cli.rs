@@ -167,7 +167,7 @@ pub struct RunArgs {
     /// Template files instead of the built-in library.
     #[arg(long, value_name = "DIR")]
     pub library: Option<PathBuf>,
-    /// A fault: black-frames, freeze-frames, misplaced-frame@N[:MM], wipe-memory@EVENT, slip@N, drop@N. May be given more than once.
+    /// A fault: black-frames, freeze-frames, misplaced-frame@N, misplaced-frame@N:MM, wipe-memory@EVENT, slip@N, drop@N. May be given more than once.
     #[arg(long, value_name = "FAULT")]
     pub inject: Vec<Injection>,
     /// Refuse every motion, as on a robot that must not move.
