@@ -167,7 +167,8 @@ pub struct RunArgs {
     /// Template files instead of the built-in library.
     #[arg(long, value_name = "DIR")]
     pub library: Option<PathBuf>,
-    /// A fault: black-frames, freeze-frames, misplaced-frame@N[:MM], wipe-memory@EVENT, transplant-memory=DIR@EVENT, slip@N, drop@N. May be given more than once.
+    /// A fault: black-frames, freeze-frames, misplaced-frame@N, misplaced-frame@N:MM, wipe-memory@EVENT,
+    /// transplant-memory=DIR@EVENT, slip@N, drop@N. May be given more than once.
     #[arg(long, value_name = "FAULT")]
     pub inject: Vec<Injection>,
     /// Refuse every motion, as on a robot that must not move.
@@ -189,6 +190,10 @@ pub struct RunArgs {
     /// Draw the episode into this GIF: what is seen, what is remembered, what is planned. One seed only.
     #[arg(long, value_name = "FILE.gif")]
     pub video: Option<PathBuf>,
+    /// Show how the run goes on while it does: on a terminal a block that is drawn anew, elsewhere a line for each
+    /// message worth telling. With --json on standard error.
+    #[arg(long)]
+    pub live: bool,
     /// Print the results as JSON instead of text.
     #[arg(long)]
     pub json: bool,

@@ -10,6 +10,7 @@
 //! | [`serve`] | `acm sim serve`: the simulator as such a robot |
 //! | [`inject`] | faults that can be put between the agent and its world |
 //! | [`narrate`] | the story of an episode, told from its messages |
+//! | [`live`] | how a run goes on, while it does |
 //! | [`demo`] | `acm demo`: the first minute |
 //! | [`perceive`] | `acm perceive`: real frames, no simulator |
 //! | [`mod@bench`] | `acm bench`: figures beside what they are to reach |
@@ -28,6 +29,7 @@ pub mod doctor;
 pub mod embed;
 pub mod episode;
 pub mod inject;
+pub mod live;
 pub mod narrate;
 pub mod perceive;
 pub mod remote;

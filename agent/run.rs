@@ -5,6 +5,7 @@ use crate::{
     config,
     episode::{EpisodeConfig, EpisodeResult, Runner},
     inject::Faults,
+    live::Live,
     narrate::Narrator,
     remote,
     statistics::{median_and, wilson95},
@@ -73,18 +74,28 @@ fn one(
     video: Option<VideoFile>,
 ) -> anyhow::Result<Exit> {
     let config = traced(scenario.name(), args, config, args.seed.first);
-    let journal: Arc<dyn Journal<Message>> = if args.json {
-        Arc::new(NoJournal)
-    } else {
-        println!("{} seed {}: {}", scenario.name(), args.seed.first, scenario.summary());
-        Arc::new(Narrator::new(Box::new(std::io::stdout())))
-    };
+    let live = args.live.then(|| Live::new(args.json));
+    let title = format!("{} seed {}: {}", scenario.name(), args.seed.first, scenario.summary());
+    let journal = listener(args, live.as_ref(), &title)?;
     let source = Source::of(scenario, args, &config);
     let result = filmed(runner, video, config, journal, |config, journal| {
         runner.run(scenario, args.seed.first, config, journal)
     })?;
+    drop(live);
     tell_result(&source, args, &result)?;
     Ok(exit_of(&result))
+}
+
+/// Who listens to the messages of one run: who shows its progress, else who tells its story, else nobody.
+pub(crate) fn listener(args: &RunArgs, live: Option<&Live>, title: &str) -> anyhow::Result<Arc<dyn Journal<Message>>> {
+    match live {
+        Some(live) => Ok(live.begin(title)?),
+        None if args.json => Ok(Arc::new(NoJournal)),
+        None => {
+            writeln!(std::io::stdout(), "{title}")?;
+            Ok(Arc::new(Narrator::new(Box::new(std::io::stdout()))))
+        }
+    }
 }
 
 /// Runs an episode and draws it, where that is wanted.
@@ -117,20 +128,28 @@ pub(crate) fn tell_result(source: &Source<'_>, args: &RunArgs, result: &EpisodeR
 
 fn many(runner: &Runner, scenario: &Scenario, args: &RunArgs, config: &EpisodeConfig) -> anyhow::Result<Exit> {
     let count = args.seed.last - args.seed.first + 1;
-    let bar = progress(count, args.json);
-    let mut results = Vec::new();
+    let live = args.live.then(|| Live::new(args.json));
+    let bar = progress(count, args.json || args.live);
+    let mut results: Vec<EpisodeResult> = Vec::new();
     for seed in args.seed.first..=args.seed.last {
-        let result = runner.run(scenario, seed, &traced(scenario.name(), args, config, seed), Arc::new(NoJournal))?;
-        tell(&bar, args.json, &line(&result))?;
+        let solved = results.iter().filter(|r| r.solved).count();
+        bar.set_message(format!("{solved} solved"));
+        let title = format!("{} seed {seed} ({} of {count}), {solved} solved", scenario.name(), results.len() + 1);
+        let journal = live.as_ref().map_or_else(|| Ok(Arc::new(NoJournal) as Arc<_>), |live| live.begin(&title))?;
+        let result = runner.run(scenario, seed, &traced(scenario.name(), args, config, seed), journal)?;
+        match &live {
+            Some(live) => live.tell(&line(&result))?,
+            None => tell(&bar, args.json, &line(&result))?,
+        }
         bar.inc(1);
         let interrupted = result.report.ending == Ending::Interrupted;
         results.push(result);
-        bar.set_message(format!("{} solved", results.iter().filter(|r| r.solved).count()));
         if interrupted {
             break;
         }
     }
     bar.finish_and_clear();
+    drop(live);
     let source = Source::of(scenario, args, config);
     let runs = Runs::new(&source, args, &results);
     if args.json {

@@ -25,7 +25,7 @@ pub enum TraceCommand {
     Repair(TraceRepairArgs),
     /// Why a message was sent: the decision behind it, what that rested on, what wrote that, and the frames seen.
     Why(TraceWhyArgs),
-    /// The run for other tools: a page, lines of JSON, Chrome's trace events, point clouds.
+    /// The run for other tools: a page, lines of JSON, Chrome's trace events, point clouds, spans.
     Export(TraceExportArgs),
     /// The viewer, served to the browser on this machine.
     View(TraceViewArgs),
@@ -178,6 +178,9 @@ pub struct TraceExportArgs {
     /// Trace events for Perfetto or chrome://tracing.
     #[arg(long, value_name = "FILE")]
     pub chrome: Option<PathBuf>,
+    /// Spans of OpenTelemetry, sent to the collector at this http:// address, or written to this file as OTLP/JSON.
+    #[arg(long, value_name = "URL|FILE")]
+    pub otlp: Option<String>,
     /// A point cloud (PLY) of each frame; needs a trace with --trace-frames full.
     #[arg(long, value_name = "FOLDER")]
     pub points: Option<PathBuf>,

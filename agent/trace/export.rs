@@ -5,10 +5,12 @@
 //! | [`lines`] | JSON, one record a line |
 //! | [`chrome`] | trace events of Chrome, which Perfetto reads |
 //! | [`points`] | point clouds in the world, as PLY |
+//! | [`otlp`] | spans of OpenTelemetry, in a file or sent to a collector |
 //! | [`super::page`] | the viewer as one HTML file |
 
 pub mod chrome;
 pub mod lines;
+pub mod otlp;
 pub mod points;
 
 use super::{page, run_file::RunFile};
@@ -22,9 +24,9 @@ use std::{
 
 /// Runs `acm trace export`.
 pub fn run(args: &TraceExportArgs) -> anyhow::Result<Exit> {
-    let TraceExportArgs { file, html, jsonl, chrome, points, frame } = args;
-    if [html, jsonl, chrome, points].iter().all(|form| form.is_none()) {
-        bail!("say in which form: --html FILE, --jsonl FILE, --chrome FILE or --points FOLDER");
+    let TraceExportArgs { file, html, jsonl, chrome, points, frame, otlp } = args;
+    if [html, jsonl, chrome, points].iter().all(|form| form.is_none()) && otlp.is_none() {
+        bail!("say in which form: --html FILE, --jsonl FILE, --chrome FILE, --points FOLDER or --otlp URL");
     }
     let mut cut = None;
     if let Some(path) = html {
@@ -48,6 +50,9 @@ pub fn run(args: &TraceExportArgs) -> anyhow::Result<Exit> {
     if let Some(folder) = points {
         let written = points::write(file, folder, *frame)?;
         eprintln!("acm: {written} point clouds in {}", folder.display());
+    }
+    if let Some(target) = otlp {
+        cut = otlp::export(file, target)?;
     }
     if let Some(reason) = cut {
         eprintln!("acm: {} is cut ({reason}); what stands before is written", file.display());

@@ -39,6 +39,21 @@ pub fn line(message: &Message) -> (Level, String) {
     (level, text(message))
 }
 
+/// Whether a person who watches the run wants to be told of it: what was asked, seen, decided, done and found, and
+/// whatever went wrong. The rest is how the actors ask each other.
+pub fn worth_telling(message: &Message) -> bool {
+    matches!(
+        message,
+        Message::Parse { .. }
+            | Message::Parsed(_)
+            | Message::Updated { .. }
+            | Message::Decided { .. }
+            | Message::SkillEnded(_)
+            | Message::Verdict { .. }
+            | Message::Ended(_)
+    ) || line(message).0 == Level::Trouble
+}
+
 fn text(message: &Message) -> String {
     match message {
         Message::Begin => "begin".into(),
