@@ -116,10 +116,9 @@ impl FromStr for Seeds {
 }
 
 /// What the agent does when memory cannot decide.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum OnUnknownArg {
     /// Give up and say what is not known.
-    #[default]
     Abstain,
     /// Draw one of the candidates.
     Guess,
@@ -155,9 +154,12 @@ pub struct RunArgs {
     /// The memory: acm, paper-identity, reactive, first-frame.
     #[arg(long, default_value = "acm")]
     pub method: String,
-    /// What to do when memory cannot decide.
-    #[arg(long, value_enum, default_value_t)]
-    pub on_unknown: OnUnknownArg,
+    /// What to do when memory cannot decide: abstain if neither this nor the configuration says.
+    #[arg(long, value_enum)]
+    pub on_unknown: Option<OnUnknownArg>,
+    /// What the agent goes by: a TOML file, such as `[perception]` with `min_confidence = 0.3`.
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
     /// The language model that reads instructions: rules (none), scripted=FILE, replay=FILE (docs/llm.md).
     #[arg(long, value_name = "ID", default_value_t)]
     pub llm: LlmId,
@@ -170,7 +172,8 @@ pub struct RunArgs {
     /// Template files instead of the built-in library.
     #[arg(long, value_name = "DIR")]
     pub library: Option<PathBuf>,
-    /// A fault: black-frames, freeze-frames, misplaced-frame@N[:MM], wipe-memory@EVENT, slip@N, drop@N. May be given more than once.
+    /// A fault: black-frames, freeze-frames, misplaced-frame@N, misplaced-frame@N:MM, wipe-memory@EVENT,
+    /// transplant-memory=DIR@EVENT, slip@N, drop@N. May be given more than once.
     #[arg(long, value_name = "FAULT")]
     pub inject: Vec<Injection>,
     /// Refuse every motion, as on a robot that must not move.
@@ -192,6 +195,10 @@ pub struct RunArgs {
     /// Draw the episode into this GIF: what is seen, what is remembered, what is planned. One seed only.
     #[arg(long, value_name = "FILE.gif")]
     pub video: Option<PathBuf>,
+    /// Show how the run goes on while it does: on a terminal a block that is drawn anew, elsewhere a line for each
+    /// message worth telling. With --json on standard error.
+    #[arg(long)]
+    pub live: bool,
     /// Print the results as JSON instead of text.
     #[arg(long)]
     pub json: bool,
@@ -209,7 +216,7 @@ impl RunArgs {
         option("robot", self.robot.as_ref().map(ToString::to_string));
         option("until", self.until.map(|until| until.to_string()));
         option("method", Some(self.method.clone()));
-        let on_unknown = self.on_unknown.to_possible_value();
+        let on_unknown = self.on_unknown.and_then(|on_unknown| on_unknown.to_possible_value());
         option("on-unknown", on_unknown.map(|value| value.get_name().to_owned()));
         option("llm", (self.llm != LlmId::Rules).then(|| self.llm.to_string()));
         option("instruction", self.instruction.clone());

@@ -13,11 +13,12 @@ use acm_actors::{
     message::Message,
     remote::{HostVerdict, RemoteRobot},
     report::{Ending, EpisodeReport},
+    settings::{Settings, Signal},
     trace::Trace,
 };
 use acm_concept::{
     embodiment::{Command, Embodiment, EmbodimentError, Feedback, RobotDescription},
-    task::{OnUnknown, TaskSpec},
+    task::TaskSpec,
     template::TemplateLibrary,
 };
 use acm_planner::{GiveUpCause, Lexicon};
@@ -40,8 +41,10 @@ use std::{
 pub struct EpisodeConfig {
     /// Name of the memory.
     pub method: String,
-    /// What to do when memory cannot decide.
-    pub on_unknown: OnUnknown,
+    /// What the agent goes by.
+    pub settings: Settings,
+    /// What is otherwise from a moment on.
+    pub fork: Option<Fork>,
     /// Instruction instead of the scenario's own.
     pub instruction: Option<String>,
     /// Folder of a memory that lasts.
@@ -64,6 +67,17 @@ pub struct EpisodeConfig {
     pub until: Option<Until>,
     /// The words that start such a run from the command line; empty where it was not started there. For the trace.
     pub arguments: Vec<String>,
+}
+
+/// What is otherwise from a moment of a run on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fork {
+    /// The moment.
+    pub begins: Signal,
+    /// Faults of the cameras that begin then.
+    pub cameras: Faults,
+    /// What the agent goes by from then on.
+    pub settings: Settings,
 }
 
 /// What an episode came to, from both sides.
@@ -298,12 +312,16 @@ impl Runner {
         trace: Option<Arc<Trace>>,
     ) -> anyhow::Result<Lived> {
         let memory = acm_baselines::by_name(&config.method, Arc::clone(&self.library), config.memory.as_deref())?;
+        let donor = config.faults.transplant.as_ref().map(|(donor, _)| donor);
+        let donated = donor.map(|donor| acm_memory::read_events(donor)).transpose()?.unwrap_or_default();
         let panic_at = config.panic_at.as_ref().or(config.faults.panic_at.as_ref());
         let agent = Agent::builder(Arc::clone(&self.library), memory)
-            .on_unknown(config.on_unknown)
+            .settings(config.settings.clone())
+            .then(config.fork.as_ref().map(|fork| (fork.begins.clone(), fork.settings.clone())))
             .seed(seed)
             .lexicon(self.lexicon.clone())
             .wipe_at(config.faults.wipe_at.clone())
+            .transplant_at(config.faults.transplant.as_ref().map(|(_, at)| at.clone()), donated.into())
             .until(config.until)
             .llm(config.llm.as_ref().map(Llm::backend))
             .journal(journal)
@@ -316,7 +334,10 @@ impl Runner {
         let commands = Arc::new(AtomicU64::new(0));
         let robot =
             Box::new(Counted { robot: outside.embodiment, commands: Arc::clone(&commands), motion: !config.no_motion });
-        let mut cameras = config.faults.cameras(outside.cameras);
+        let mut cameras = config.faults.cameras(outside.cameras, None);
+        if let Some(fork) = &config.fork {
+            cameras = fork.cameras.cameras(cameras, Some(fork.begins.clone()));
+        }
         if let Some(tap) = &config.frames {
             cameras = tap.cameras(cameras);
         }

@@ -1,16 +1,16 @@
 //! Faults that can be put between the agent and its world.
 
-use acm_actors::episode::WipeAt;
+use acm_actors::{episode::FaultEvent, settings::Signal};
 use acm_concept::camera::{CameraError, CameraModel, CameraSource, RgbdFrame};
 use std::{
     fmt,
+    path::PathBuf,
     str::FromStr,
-    sync::{
-        Arc, Mutex, PoisonError,
-        atomic::{AtomicBool, Ordering},
-    },
+    sync::{Arc, Mutex, PoisonError},
 };
 
+/// How the fault begins that puts another memory into the run's own place.
+const TRANSPLANT: &str = "transplant-memory=";
 /// By how much a misplaced frame's camera is said to stand aside where the fault does not say it, millimetres.
 const ASIDE_MM: u32 = 20;
 /// A knock that moves a camera farther than this is a fall, millimetres.
@@ -26,7 +26,14 @@ pub enum Injection {
     /// A frame says that its camera stood aside of where it stood, as after a knock.
     MisplacedFrame(Misplaced),
     /// Memory is wiped once at an event.
-    WipeMemory(WipeAt),
+    WipeMemory(FaultEvent),
+    /// The memory in a folder takes the place of the run's own once at an event.
+    TransplantMemory {
+        /// The folder. It is left as it is.
+        donor: PathBuf,
+        /// When.
+        at: FaultEvent,
+    },
     /// What the hand carries is taken out of it unseen, during its nth carry from 1.
     Slip(u32),
     /// The fingers open for a moment during the nth carry from 1, and what they carry falls.
@@ -63,6 +70,13 @@ impl FromStr for Misplaced {
     }
 }
 
+impl Injection {
+    /// Whether it befalls the cameras.
+    pub fn is_of_cameras(&self) -> bool {
+        matches!(self, Injection::BlackFrames | Injection::FreezeFrames | Injection::MisplacedFrame(_))
+    }
+}
+
 impl fmt::Display for Injection {
     /// As `--inject` takes it.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -73,6 +87,7 @@ impl fmt::Display for Injection {
                 write!(f, "misplaced-frame@{}:{}", frame.frame, frame.aside_mm)
             }
             Injection::WipeMemory(event) => write!(f, "wipe-memory@{event}"),
+            Injection::TransplantMemory { donor, at } => write!(f, "{TRANSPLANT}{}@{at}", donor.display()),
             Injection::Slip(carry) => write!(f, "slip@{carry}"),
             Injection::Drop(carry) => write!(f, "drop@{carry}"),
             Injection::Panic { role, message } => write!(f, "panic@{role}:{message}"),
@@ -83,6 +98,14 @@ impl fmt::Display for Injection {
 impl FromStr for Injection {
     type Err = String;
     fn from_str(text: &str) -> Result<Self, String> {
+        if let Some(transplant) = text.strip_prefix(TRANSPLANT) {
+            let (donor, event) =
+                transplant.rsplit_once('@').filter(|(donor, _)| !donor.is_empty()).ok_or_else(|| {
+                    format!("`{text}` does not name a folder and an event: write {TRANSPLANT}DIR@instruction")
+                })?;
+            let at = event.parse().map_err(|e: acm_actors::episode::ParseEventError| e.to_string())?;
+            return Ok(Injection::TransplantMemory { donor: donor.into(), at });
+        }
         match text.split_once('@') {
             None if text == "black-frames" => Ok(Injection::BlackFrames),
             None if text == "freeze-frames" => Ok(Injection::FreezeFrames),
@@ -107,7 +130,7 @@ impl FromStr for Injection {
                 }
             }
             _ => Err(format!(
-                "`{text}` is no fault: black-frames, freeze-frames, misplaced-frame@N[:MM], wipe-memory@EVENT, slip@N or drop@N"
+                "`{text}` is no fault: black-frames, freeze-frames, misplaced-frame@N[:MM], wipe-memory@EVENT, transplant-memory=DIR@EVENT, slip@N or drop@N"
             )),
         }
     }
@@ -123,40 +146,16 @@ pub struct Faults {
     /// See [`Injection::MisplacedFrame`].
     pub misplaced: Option<Misplaced>,
     /// See [`Injection::WipeMemory`].
-    pub wipe_at: Option<WipeAt>,
+    pub wipe_at: Option<FaultEvent>,
+    /// See [`Injection::TransplantMemory`]: the folder and the event.
+    pub transplant: Option<(PathBuf, FaultEvent)>,
     /// See [`Injection::Slip`].
     pub slip_at: Option<u32>,
     /// See [`Injection::Drop`].
     pub drop_at: Option<u32>,
     /// See [`Injection::Panic`].
     pub panic_at: Option<(String, u64)>,
-    /// Where the faults of the cameras begin; at once if nothing says when.
-    pub cameras_from: Option<Signal>,
 }
-
-/// Something that is to happen once another thing has happened.
-#[derive(Debug, Clone, Default)]
-pub struct Signal(Arc<AtomicBool>);
-
-impl Signal {
-    /// It has happened.
-    pub fn give(&self) {
-        self.0.store(true, Ordering::SeqCst);
-    }
-    /// Whether it has.
-    pub fn is_given(&self) -> bool {
-        self.0.load(Ordering::SeqCst)
-    }
-}
-
-impl PartialEq for Signal {
-    /// Two handles of one signal.
-    fn eq(&self, other: &Signal) -> bool {
-        Arc::ptr_eq(&self.0, &other.0)
-    }
-}
-
-impl Eq for Signal {}
 
 impl Faults {
     /// Sorts faults; of two that exclude each other the later one holds.
@@ -168,6 +167,7 @@ impl Faults {
                 Injection::FreezeFrames => faults.freeze_frames = true,
                 Injection::MisplacedFrame(frame) => faults.misplaced = Some(*frame),
                 Injection::WipeMemory(event) => faults.wipe_at = Some(event.clone()),
+                Injection::TransplantMemory { donor, at } => faults.transplant = Some((donor.clone(), at.clone())),
                 Injection::Slip(carry) => faults.slip_at = Some(*carry),
                 Injection::Drop(carry) => faults.drop_at = Some(*carry),
                 Injection::Panic { role, message } => faults.panic_at = Some((role.clone(), *message)),
@@ -175,12 +175,12 @@ impl Faults {
         }
         faults
     }
-    /// Puts the camera faults in front of a camera.
-    pub fn cameras(&self, cameras: Box<dyn CameraSource>) -> Box<dyn CameraSource> {
+    /// Puts the camera faults in front of a camera: from the first frame on, or from a signal on.
+    pub fn cameras(&self, cameras: Box<dyn CameraSource>, from: Option<Signal>) -> Box<dyn CameraSource> {
         if !self.black_frames && !self.freeze_frames && self.misplaced.is_none() {
             return cameras;
         }
-        Box::new(FaultyCamera { cameras, faults: self.clone(), first: None, given: 0 })
+        Box::new(FaultyCamera { cameras, faults: self.clone(), from, first: None, given: 0 })
     }
 }
 
@@ -236,8 +236,10 @@ impl CameraSource for TappedCamera {
 struct FaultyCamera {
     cameras: Box<dyn CameraSource>,
     faults: Faults,
+    /// Where they begin; at once if nothing says when.
+    from: Option<Signal>,
     first: Option<RgbdFrame>,
-    /// Frames given so far.
+    /// Frames given since they began.
     given: u32,
 }
 
@@ -247,14 +249,14 @@ impl CameraSource for FaultyCamera {
     }
     fn capture(&mut self, camera: &str) -> Result<RgbdFrame, CameraError> {
         let mut frame = self.cameras.capture(camera)?;
-        self.given += 1;
-        if let Some(misplaced) = self.faults.misplaced.filter(|misplaced| misplaced.frame == self.given) {
-            frame.header.camera_pose.translation.x += 1e-3 * f64::from(misplaced.aside_mm);
-        }
-        if self.faults.cameras_from.as_ref().is_some_and(|from| !from.is_given()) {
+        if self.from.as_ref().is_some_and(|from| !from.is_given()) {
             // Frozen is the last picture before the fault.
             self.first = Some(frame.clone());
             return Ok(frame);
+        }
+        self.given += 1;
+        if let Some(misplaced) = self.faults.misplaced.filter(|misplaced| misplaced.frame == self.given) {
+            frame.header.camera_pose.translation.x += 1e-3 * f64::from(misplaced.aside_mm);
         }
         if self.faults.black_frames {
             frame.color = vec![0; frame.color.len()].into();
@@ -303,7 +305,7 @@ mod tests {
 
     #[test]
     fn only_the_one_frame_is_said_to_stand_aside() {
-        let mut cameras = Faults::new(&["misplaced-frame@2:50".parse().unwrap()]).cameras(Box::new(Counting(0)));
+        let mut cameras = Faults::new(&["misplaced-frame@2:50".parse().unwrap()]).cameras(Box::new(Counting(0)), None);
         let mut stood = |_| cameras.capture("head").map(|frame| frame.header.camera_pose.translation).unwrap();
         let stands = [1, 2, 3].map(&mut stood);
         let nominal = DVec3::new(0.1, 0.2, 0.3);
@@ -313,13 +315,14 @@ mod tests {
     #[test]
     fn faults_are_read_and_mistakes_named() {
         assert_eq!(["slip@2", "drop@1"].map(str::parse), [Ok(Injection::Slip(2)), Ok(Injection::Drop(1))]);
-        assert_eq!("wipe-memory@instruction".parse(), Ok(Injection::WipeMemory(WipeAt::Instruction)));
+        assert_eq!("wipe-memory@instruction".parse(), Ok(Injection::WipeMemory(FaultEvent::Instruction)));
         assert_eq!("panic@memory:4".parse(), Ok(Injection::Panic { role: "memory".into(), message: 4 }));
         for word in [
             "black-frames",
             "freeze-frames",
             "misplaced-frame@2:20",
             "wipe-memory@first-verified-place",
+            "transplant-memory=a@b/c@instruction",
             "slip@2",
             "panic@memory:4",
         ] {
@@ -333,6 +336,9 @@ mod tests {
             "slip",
             "wipe-memory@noon",
             "white-frames",
+            "transplant-memory=@instruction",
+            "transplant-memory=there",
+            "transplant-memory=there@noon",
             "misplaced-frame@0",
             "misplaced-frame@1:0",
             "misplaced-frame@1:9999",

@@ -3,6 +3,7 @@
 //! | module | holds |
 //! |---|---|
 //! | [`cli`] | the command line and its exit codes |
+//! | [`config`] | what the agent goes by, as a file |
 //! | [`episode`] | one episode: simulator, agent, judge |
 //! | [`run`] | `acm run`: one episode told, or a range of seeds counted |
 //! | [`remote`] | `acm run --robot`: an episode on a robot in another process |
@@ -10,6 +11,7 @@
 //! | [`inject`] | faults that can be put between the agent and its world |
 //! | [`llm`] | which language model reads instructions, if any |
 //! | [`narrate`] | the story of an episode, told from its messages |
+//! | [`live`] | how a run goes on, while it does |
 //! | [`demo`] | `acm demo`: the first minute |
 //! | [`perceive`] | `acm perceive`: real frames, no simulator |
 //! | [`mod@bench`] | `acm bench`: figures beside what they are to reach |
@@ -22,11 +24,13 @@
 
 pub mod bench;
 pub mod cli;
+pub mod config;
 pub mod demo;
 pub mod doctor;
 pub mod embed;
 pub mod episode;
 pub mod inject;
+pub mod live;
 pub mod llm;
 pub mod narrate;
 pub mod perceive;

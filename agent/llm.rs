@@ -1,6 +1,6 @@
 //! `--llm`: which language model reads instructions, if any.
 
-use crate::inject::Signal;
+use acm_actors::settings::Signal;
 use acm_llm::{Backend, CallError, Cassette, ChatRequest, FileError, Reply, Script};
 use std::{fmt, path::PathBuf, str::FromStr, sync::Arc};
 

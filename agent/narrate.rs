@@ -81,7 +81,7 @@ impl Journal<Message> for Narrator {
     fn record(&self, message: &Envelope<Message>) -> Result<(), JournalError> {
         let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
         let lines = told.lines(message);
-        told.silent &= !matches!(message.body, Message::Wipe | Message::ActorFailed { .. });
+        told.silent &= !matches!(message.body, Message::Wipe | Message::Transplant | Message::ActorFailed { .. });
         let told = &mut *told;
         for line in lines.iter().filter(|_| !told.silent) {
             writeln!(told.sink, "{line}").map_err(|e| JournalError(e.to_string()))?;
@@ -109,6 +109,10 @@ impl Told {
             Message::Wipe => {
                 self.places.clear();
                 vec!["fault     memory wiped: objects, places, moves and progress are gone; the task is not".into()]
+            }
+            Message::Transplant => {
+                self.places.clear();
+                vec!["fault     another memory has taken the place of the run's own; the task is still known".into()]
             }
             Message::Decided { decision, .. } => {
                 let mut lines = self.at_rest(f64::INFINITY);

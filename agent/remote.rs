@@ -3,18 +3,15 @@
 use crate::{
     cli::{Exit, RunArgs},
     episode::Runner,
-    narrate::Narrator,
-    run::{Source, exit_of, filmed, prepare, tell_result, traced},
+    live::Live,
+    run::{Source, exit_of, filmed, listener, prepare, tell_result, traced},
     video::VideoFile,
 };
 use acm_actors::{
-    message::Message,
     remote::{Carrier, RemoteRobot},
     report::Ending,
 };
-use acm_runtime::journal::{Journal, NoJournal};
 use anyhow::{Context, ensure};
-use std::{io::Write, sync::Arc};
 
 /// The name under which the agent says hello.
 const AGENT: &str = concat!("acm ", env!("CARGO_PKG_VERSION"));
@@ -39,21 +36,18 @@ pub fn run(args: &RunArgs) -> anyhow::Result<Exit> {
     if let Some(reason) = robot.fallback() {
         eprintln!("acm: frames come inline: {reason}");
     }
-    let journal: Arc<dyn Journal<Message>> = match args.json {
-        true => Arc::new(NoJournal),
-        false => {
-            let frames = match robot.carrier() {
-                Carrier::SharedMemory => "through shared memory",
-                Carrier::Inline => "inline",
-            };
-            writeln!(std::io::stdout(), "{} at {address}, frames {frames}", robot.host())?;
-            Arc::new(Narrator::new(Box::new(std::io::stdout())))
-        }
+    let frames = match robot.carrier() {
+        Carrier::SharedMemory => "through shared memory",
+        Carrier::Inline => "inline",
     };
+    let live = args.live.then(|| Live::new(args.json));
+    let journal = listener(args, live.as_ref(), &format!("{} at {address}, frames {frames}", robot.host()))?;
+    let on_unknown = config.settings.on_unknown;
     let result = filmed(&runner, video, config, journal, |config, journal| {
         runner.run_remote(&robot, args.seed.first, config, journal)
     })?;
-    tell_result(&Source { name: &address.to_string(), sensor: "the host's" }, args, &result)?;
+    drop(live);
+    tell_result(&Source { name: &address.to_string(), sensor: "the host's", on_unknown }, args, &result)?;
     if let Ending::Broken { reason } = &result.report.ending {
         eprintln!("acm: the run broke off: {reason}");
     }

@@ -2,8 +2,10 @@
 
 use crate::{
     cli::{Exit, RunArgs},
+    config,
     episode::{EpisodeConfig, EpisodeResult, Runner},
     inject::Faults,
+    live::Live,
     llm::Llm,
     narrate::Narrator,
     remote,
@@ -12,7 +14,7 @@ use crate::{
     video::{Camera, VideoFile},
 };
 use acm_actors::{message::Message, report::Ending};
-use acm_concept::template::TemplateLibrary;
+use acm_concept::{task::OnUnknown, template::TemplateLibrary};
 use acm_runtime::journal::{Both, Journal, NoJournal};
 use acm_sim::Scenario;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -39,9 +41,11 @@ pub fn run(args: &RunArgs) -> anyhow::Result<Exit> {
 
 /// Reads what a run needs beside its world.
 pub(crate) fn prepare(args: &RunArgs) -> anyhow::Result<(EpisodeConfig, TemplateLibrary)> {
+    let mut settings = args.config.as_deref().map(config::read).transpose()?.unwrap_or_default();
+    settings.on_unknown = args.on_unknown.map_or(settings.on_unknown, Into::into);
     let config = EpisodeConfig {
         method: args.method.clone(),
-        on_unknown: args.on_unknown.into(),
+        settings,
         instruction: args.instruction.clone(),
         memory: args.memory.clone(),
         faults: Faults::new(&args.inject),
@@ -58,6 +62,9 @@ pub(crate) fn prepare(args: &RunArgs) -> anyhow::Result<(EpisodeConfig, Template
     };
     // A misspelt method or a memory that cannot be opened must not cost the start of the renderer.
     drop(acm_baselines::by_name(&config.method, Arc::new(library.clone()), config.memory.as_deref())?);
+    if let Some((donor, _)) = &config.faults.transplant {
+        drop(acm_memory::read_events(donor)?);
+    }
     Ok((config, library))
 }
 
@@ -69,17 +76,28 @@ fn one(
     video: Option<VideoFile>,
 ) -> anyhow::Result<Exit> {
     let config = traced(scenario.name(), args, config, args.seed.first);
-    let journal: Arc<dyn Journal<Message>> = if args.json {
-        Arc::new(NoJournal)
-    } else {
-        println!("{} seed {}: {}", scenario.name(), args.seed.first, scenario.summary());
-        Arc::new(Narrator::new(Box::new(std::io::stdout())))
-    };
+    let live = args.live.then(|| Live::new(args.json));
+    let title = format!("{} seed {}: {}", scenario.name(), args.seed.first, scenario.summary());
+    let journal = listener(args, live.as_ref(), &title)?;
+    let source = Source::of(scenario, args, &config);
     let result = filmed(runner, video, config, journal, |config, journal| {
         runner.run(scenario, args.seed.first, config, journal)
     })?;
-    tell_result(&Source::of(scenario, args), args, &result)?;
+    drop(live);
+    tell_result(&source, args, &result)?;
     Ok(exit_of(&result))
+}
+
+/// Who listens to the messages of one run: who shows its progress, else who tells its story, else nobody.
+pub(crate) fn listener(args: &RunArgs, live: Option<&Live>, title: &str) -> anyhow::Result<Arc<dyn Journal<Message>>> {
+    match live {
+        Some(live) => Ok(live.begin(title)?),
+        None if args.json => Ok(Arc::new(NoJournal)),
+        None => {
+            writeln!(std::io::stdout(), "{title}")?;
+            Ok(Arc::new(Narrator::new(Box::new(std::io::stdout()))))
+        }
+    }
 }
 
 /// Runs an episode and draws it, where that is wanted.
@@ -112,21 +130,29 @@ pub(crate) fn tell_result(source: &Source<'_>, args: &RunArgs, result: &EpisodeR
 
 fn many(runner: &Runner, scenario: &Scenario, args: &RunArgs, config: &EpisodeConfig) -> anyhow::Result<Exit> {
     let count = args.seed.last - args.seed.first + 1;
-    let bar = progress(count, args.json);
-    let mut results = Vec::new();
+    let live = args.live.then(|| Live::new(args.json));
+    let bar = progress(count, args.json || args.live);
+    let mut results: Vec<EpisodeResult> = Vec::new();
     for seed in args.seed.first..=args.seed.last {
-        let result = runner.run(scenario, seed, &traced(scenario.name(), args, config, seed), Arc::new(NoJournal))?;
-        tell(&bar, args.json, &line(&result))?;
+        let solved = results.iter().filter(|r| r.solved).count();
+        bar.set_message(format!("{solved} solved"));
+        let title = format!("{} seed {seed} ({} of {count}), {solved} solved", scenario.name(), results.len() + 1);
+        let journal = live.as_ref().map_or_else(|| Ok(Arc::new(NoJournal) as Arc<_>), |live| live.begin(&title))?;
+        let result = runner.run(scenario, seed, &traced(scenario.name(), args, config, seed), journal)?;
+        match &live {
+            Some(live) => live.tell(&line(&result))?,
+            None => tell(&bar, args.json, &line(&result))?,
+        }
         bar.inc(1);
         let interrupted = result.report.ending == Ending::Interrupted;
         results.push(result);
-        bar.set_message(format!("{} solved", results.iter().filter(|r| r.solved).count()));
         if interrupted {
             break;
         }
     }
     bar.finish_and_clear();
-    let source = Source::of(scenario, args);
+    drop(live);
+    let source = Source::of(scenario, args, config);
     let runs = Runs::new(&source, args, &results);
     if args.json {
         serde_json::to_writer_pretty(std::io::stdout().lock(), &runs)?;
@@ -318,11 +344,14 @@ pub(crate) struct Source<'a> {
     pub name: &'a str,
     /// The sensor profile.
     pub sensor: &'a str,
+    /// What the agent does when memory cannot decide.
+    pub on_unknown: OnUnknown,
 }
 
 impl<'a> Source<'a> {
-    fn of(scenario: &'a Scenario, args: &'a RunArgs) -> Source<'a> {
-        Source { name: scenario.name(), sensor: args.sensor.as_deref().unwrap_or(scenario.sensor()) }
+    fn of(scenario: &'a Scenario, args: &'a RunArgs, config: &EpisodeConfig) -> Source<'a> {
+        let sensor = args.sensor.as_deref().unwrap_or(scenario.sensor());
+        Source { name: scenario.name(), sensor, on_unknown: config.settings.on_unknown }
     }
 }
 
@@ -356,9 +385,9 @@ impl<'a> Runs<'a> {
             schema: "acm.run/1",
             scenario: source.name,
             method: &args.method,
-            on_unknown: match args.on_unknown {
-                crate::cli::OnUnknownArg::Abstain => "abstain",
-                crate::cli::OnUnknownArg::Guess => "guess",
+            on_unknown: match source.on_unknown {
+                OnUnknown::Abstain => "abstain",
+                OnUnknown::Guess => "guess",
             },
             sensor: source.sensor,
             seeds: [args.seed.first, args.seed.last],

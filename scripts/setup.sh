@@ -55,8 +55,8 @@ fetch_sources() {
     cargo fetch --locked --quiet </dev/null || fail "cargo could not fetch the sources named in Cargo.lock (see above)"
 }
 
-# A test reads traces with the MCAP libraries that others use. Where Python has no venv or there is no network the test
-# says that it is skipped; nothing else needs them.
+# Tests read traces and spans with the libraries that others use. Where Python has no venv or there is no network these
+# tests say that they are skipped; nothing else needs them.
 install_trace_reader() {
     local folder=${CARGO_TARGET_DIR:-target}/python list=scripts/trace_reader_requirements.txt log
     cmp -s "$list" "$folder/installed.txt" && return
@@ -65,10 +65,10 @@ install_trace_reader() {
         "$folder/bin/python" -m pip install --quiet --disable-pip-version-check --timeout 20 --retries 1 \
             --requirement "$list" </dev/null >>"$log" 2>&1; then
         cp "$list" "$folder/installed.txt"
-        printf 'setup: installed the MCAP reader for one test in %s\n' "$folder"
+        printf 'setup: installed readers of traces and spans for tests in %s\n' "$folder"
     else
         rm -rf "$folder"
-        printf 'setup: no MCAP reader from PyPI (%s): the test that compares with it is skipped\n' \
+        printf 'setup: no readers of traces and spans from PyPI (%s): the tests that compare with them are skipped\n' \
             "$(tail -n 1 "$log")"
     fi
     rm -f "$log"

@@ -3,14 +3,22 @@
 
 #[path = "command_line/chromium.rs"]
 mod chromium;
+#[path = "command_line/debugging.rs"]
+mod debugging;
 #[path = "command_line/demo.rs"]
 mod demo;
 #[path = "command_line/export.rs"]
 mod export;
+#[path = "command_line/live.rs"]
+mod live;
 #[path = "command_line/llm.rs"]
 mod llm;
 #[path = "command_line/long.rs"]
 mod long;
+#[path = "command_line/other_programs.rs"]
+mod other_programs;
+#[path = "command_line/otlp.rs"]
+mod otlp;
 #[path = "command_line/perceive.rs"]
 mod perceive;
 #[path = "command_line/real_frames.rs"]

@@ -71,6 +71,23 @@ fn a_wiped_memory_does_not_know_where_the_block_came_from() {
     assert!(unknown(&result).contains("came from"), "{}", unknown(&result));
 }
 
+/// The memory is what decides: with another episode's in its place, the block goes where that one's came from.
+#[test]
+fn a_transplanted_memory_gives_the_answer_of_its_donor() {
+    let dir = tempfile::tempdir().unwrap();
+    let donor = dir.path().join("donor");
+    let own = run("put-back-block", 0, &[], |config| config.memory = Some(donor.clone()));
+    assert!(own.solved, "{}", own.verdict.explanation);
+    let fault = format!("transplant-memory={}@first-verified-place", donor.display());
+    let other = run("put-back-block", 2, &[&fault], |_| {});
+    assert_eq!(other.report.ending, Ending::Done);
+    assert!(
+        other.false_success,
+        "the world of seed 2 begins with the block on another mat: {}",
+        other.verdict.explanation
+    );
+}
+
 #[test]
 fn a_block_that_slips_away_is_never_reported_as_done_wrongly() {
     let result = run("put-back-block", 5, &["slip@1"], |_| {});

@@ -1,7 +1,7 @@
 //! The builder that puts an agent together, and one episode's run.
 
 use crate::{
-    episode::{Episode, Until, WipeAt},
+    episode::{Episode, FaultEvent, Until, Upheavals},
     executor::ExecutorActor,
     host::{HostPort, Outside},
     llm::LlmPort,
@@ -10,18 +10,19 @@ use crate::{
     perception::PerceptionActor,
     planner::PlannerActor,
     report::EpisodeReport,
+    settings::{Settings, Signal, Turning},
     trace::Trace,
     verifier::VerifierActor,
 };
 use acm_concept::{
     camera::{CameraSource, RgbdFrame},
     embodiment::{Clock, Embodiment},
-    task::{OnUnknown, TaskSpec},
+    task::TaskSpec,
     template::TemplateLibrary,
 };
 use acm_llm::Backend;
-use acm_memory::Memory;
-use acm_perception::{Grounder, GrounderConfig};
+use acm_memory::{Memory, event::Event};
+use acm_perception::Grounder;
 use acm_planner::{Lexicon, PlanOptions, Planner};
 use acm_runtime::{
     envelope::Role,
@@ -63,32 +64,33 @@ pub enum AgentError {
 pub struct AgentBuilder {
     library: Arc<TemplateLibrary>,
     memory: Arc<Mutex<Box<dyn Memory>>>,
-    on_unknown: OnUnknown,
+    settings: Settings,
+    then: Option<(Signal, Settings)>,
     seed: u64,
-    grounder: GrounderConfig,
     lexicon: Option<Lexicon>,
     journal: Arc<dyn Journal<Message>>,
     trace: Option<Arc<Trace>>,
-    wipe_at: Option<WipeAt>,
+    upheavals: Upheavals,
+    donated: Arc<[Event]>,
     until: Option<Until>,
     panic_at: Option<PanicAt>,
     llm: Option<Arc<dyn Backend>>,
 }
 
 impl AgentBuilder {
-    /// What to do when memory cannot decide.
-    pub fn on_unknown(mut self, on_unknown: OnUnknown) -> Self {
-        self.on_unknown = on_unknown;
+    /// What the agent goes by.
+    pub fn settings(mut self, settings: Settings) -> Self {
+        self.settings = settings;
+        self
+    }
+    /// What it goes by from a signal on.
+    pub fn then(mut self, then: Option<(Signal, Settings)>) -> Self {
+        self.then = then;
         self
     }
     /// Seed of the draws that guessing makes.
     pub fn seed(mut self, seed: u64) -> Self {
         self.seed = seed;
-        self
-    }
-    /// Thresholds of perception.
-    pub fn grounder(mut self, config: GrounderConfig) -> Self {
-        self.grounder = config;
         self
     }
     /// Another lexicon than the one that ships inside the binary.
@@ -107,8 +109,13 @@ impl AgentBuilder {
         self
     }
     /// Wipes memory at an event, as a fault for tests.
-    pub fn wipe_at(mut self, event: Option<WipeAt>) -> Self {
-        self.wipe_at = event;
+    pub fn wipe_at(mut self, event: Option<FaultEvent>) -> Self {
+        self.upheavals.wipe_at = event;
+        self
+    }
+    /// Puts what another memory came to into this one's place at an event, as a fault for tests.
+    pub fn transplant_at(mut self, event: Option<FaultEvent>, donated: Arc<[Event]>) -> Self {
+        (self.upheavals.transplant_at, self.donated) = (event, donated);
         self
     }
     /// Ends each run at an event; see [`crate::report::Ending::Until`].
@@ -165,13 +172,14 @@ impl Agent {
         AgentBuilder {
             library,
             memory: Arc::new(Mutex::new(memory)),
-            on_unknown: OnUnknown::default(),
+            settings: Settings::default(),
+            then: None,
             seed: 0,
-            grounder: GrounderConfig::default(),
             lexicon: None,
             journal: Arc::new(NoJournal),
             trace: None,
-            wipe_at: None,
+            upheavals: Upheavals::default(),
+            donated: Arc::default(),
             until: None,
             panic_at: None,
             llm: None,
@@ -239,10 +247,15 @@ impl Agent {
         let parts = &self.parts;
         let bus: Arc<dyn FrameBus<RgbdFrame>> = Arc::new(InProcessBus::new(BUS_FRAMES));
         let robot = outside.lock().unwrap_or_else(PoisonError::into_inner).embodiment.description().clone();
-        let grounder = Arc::new(Grounder::new(Arc::clone(&parts.library), parts.grounder.clone()));
-        let options = PlanOptions { on_unknown: parts.on_unknown, seed: parts.seed };
-        let (memory, wipe_at, until) = (Arc::downgrade(&parts.memory), parts.wipe_at.clone(), parts.until);
-        let (planner, library) = (Arc::clone(&self.planner), Arc::clone(&parts.library));
+        let settings = Turning::new(parts.settings.clone(), parts.then.clone());
+        let library = Arc::clone(&parts.library);
+        let grounder =
+            settings.clone().map(|settings| Arc::new(Grounder::new(Arc::clone(&library), settings.perception)));
+        let seed = parts.seed;
+        let options = settings.map(|settings| PlanOptions { on_unknown: settings.on_unknown, seed });
+        let (memory, upheavals, until) = (Arc::downgrade(&parts.memory), parts.upheavals.clone(), parts.until);
+        let donated = Arc::clone(&parts.donated);
+        let planner = Arc::clone(&self.planner);
         let (frames, seen, kept) = (Arc::clone(&bus), Arc::clone(&bus), bus);
         let (eyes, hands, plans) = (robot.clone(), robot.clone(), robot);
         let journal: Arc<dyn Journal<Message>> = match &parts.trace {
@@ -252,21 +265,19 @@ impl Agent {
         let observer = parts.trace.clone().map(|trace| trace as Arc<dyn MemoryObserver>);
         let (llm, hybrid) = (parts.llm.clone(), parts.llm.is_some());
         let system = SystemBuilder::new(1, journal)
-            .actor(EPISODE, Box::new(move || Box::new(Episode::new(task.clone(), wipe_at.clone()).until(until))))
+            .actor(EPISODE, Box::new(move || Box::new(Episode::new(task.clone(), upheavals.clone()).until(until))))
             .actor(
                 HOST,
                 Box::new(move || Box::new(HostPort::new(Arc::clone(&outside), camera.clone(), Arc::clone(&frames)))),
             )
             .actor(
                 PERCEPTION,
-                Box::new(move || {
-                    Box::new(PerceptionActor::new(Arc::clone(&grounder), eyes.clone(), Arc::clone(&seen)))
-                }),
+                Box::new(move || Box::new(PerceptionActor::new(grounder.clone(), eyes.clone(), Arc::clone(&seen)))),
             )
             .actor(
                 MEMORY,
                 Box::new(move || {
-                    let actor = MemoryActor::new(Weak::clone(&memory), Arc::clone(&kept));
+                    let actor = MemoryActor::new(Weak::clone(&memory), Arc::clone(&kept)).donated(Arc::clone(&donated));
                     Box::new(actor.observed_by(observer.clone()))
                 }),
             )
@@ -274,7 +285,7 @@ impl Agent {
                 PLANNER,
                 Box::new(move || {
                     let (planner, library) = (Arc::clone(&planner), Arc::clone(&library));
-                    Box::new(PlannerActor::new(planner, library, plans.clone(), options).hybrid(hybrid))
+                    Box::new(PlannerActor::new(planner, library, plans.clone(), options.clone()).hybrid(hybrid))
                 }),
             )
             .actor(EXECUTOR, Box::new(move || Box::new(ExecutorActor::new(hands.clone()))))

@@ -22,7 +22,7 @@ use acm_runtime::{
 };
 use asked::Asked;
 use state::{Doing, Pending};
-pub use state::{ParseEventError, Until, WipeAt};
+pub use state::{FaultEvent, ParseEventError, Until, Upheavals};
 
 /// How many frames may be taken to decide one verification.
 const MAX_VERIFY_LOOKS: u32 = 2;
@@ -36,7 +36,7 @@ const MAX_RESTARTS: u32 = 4;
 /// The episode loop's core.
 pub struct Episode {
     asked: Asked,
-    wipe_at: Option<WipeAt>,
+    upheavals: Upheavals,
     until: Option<Until>,
     doing: Doing,
     task: Option<std::sync::Arc<acm_planner::Task>>,
@@ -52,11 +52,11 @@ pub struct Episode {
 }
 
 impl Episode {
-    /// An episode of the given task. With `wipe_at`, memory is wiped once at that event: a fault for tests.
-    pub fn new(task_spec: TaskSpec, wipe_at: Option<WipeAt>) -> Episode {
+    /// An episode of the given task, with what is to befall memory.
+    pub fn new(task_spec: TaskSpec, upheavals: Upheavals) -> Episode {
         Episode {
             asked: Asked::new(task_spec),
-            wipe_at,
+            upheavals,
             until: None,
             doing: Doing::Starting,
             task: None,
@@ -314,8 +314,11 @@ impl Episode {
                 self.parse(out);
             }
             Doing::Beginning => self.look("watching before the instruction", out),
-            Doing::Instructing if self.wipe_is_due(&WipeAt::Instruction) => self.wipe(out),
-            Doing::Instructing => self.look("the instruction was given", out),
+            Doing::Instructing => {
+                if !self.upheaval(&FaultEvent::Instruction, out) {
+                    self.look("the instruction was given", out);
+                }
+            }
             Doing::Noting => self.decide(out),
             Doing::Recording => {
                 if let Some(pending) = &mut self.pending {
@@ -325,6 +328,7 @@ impl Episode {
             }
             Doing::Settling(outcome) => self.settled(outcome, out),
             Doing::Wiping => self.instruct(out),
+            Doing::Transplanting => self.send(Doing::Wiping, MEMORY, Message::Note(Note::EpisodeBegan), out),
             _ => self.look("memory kept something", out),
         }
     }
@@ -333,9 +337,9 @@ impl Episode {
         let pending = self.pending.take();
         let looked = pending.as_ref().is_some_and(|p| p.looks > 0);
         if let (Outcome::Verified, Some(pending)) = (outcome, &pending) {
-            let event = WipeAt::FirstVerified(pending.executed.report.invocation.skill.clone());
-            if self.wipe_is_due(&event) {
-                return self.wipe(out);
+            let event = FaultEvent::FirstVerified(pending.executed.report.invocation.skill.clone());
+            if self.upheaval(&event, out) {
+                return;
             }
         }
         // After a contradiction the world is not as believed: look before deciding, unless a look showed it.
@@ -347,15 +351,19 @@ impl Episode {
 
     // --- faults -------------------------------------------------------------------------------------------------
 
-    fn wipe_is_due(&self, event: &WipeAt) -> bool {
-        self.wipe_at.as_ref() == Some(event)
-    }
-
-    /// Forgets everything but the task's text, as a fault for tests.
-    fn wipe(&mut self, out: &mut Outbox<Message>) {
-        self.wipe_at = None;
+    /// Lets happen to memory what is to happen at an event; tells whether anything is. But for the task's text the agent
+    /// goes on with nothing else than what memory holds then.
+    fn upheaval(&mut self, event: &FaultEvent, out: &mut Outbox<Message>) -> bool {
+        let (doing, fault) = if self.upheavals.wipe_at.take_if(|at| at == event).is_some() {
+            (Doing::Wiping, Message::Wipe)
+        } else if self.upheavals.transplant_at.take_if(|at| at == event).is_some() {
+            (Doing::Transplanting, Message::Transplant)
+        } else {
+            return false;
+        };
         (self.looks, self.step, self.pending) = (0, None, None);
-        self.send(Doing::Wiping, MEMORY, Message::Wipe, out);
+        self.send(doing, MEMORY, fault, out);
+        true
     }
 
     /// An actor failed: what it was doing is lost; memory is not. A skill that was running counts as failed.

@@ -18,6 +18,7 @@
 //! |---|---|
 //! | [`agent`] | the builder that puts an agent together, and one episode's run |
 //! | [`message`] | every message between the actors |
+//! | [`settings`] | what an agent goes by |
 //! | [`trace`] | all of a run in one file |
 //! | [`replay`] | the world of a recorded run |
 //! | [`report`] | what an episode came to |
@@ -39,6 +40,7 @@ pub mod planner;
 pub mod remote;
 pub mod replay;
 pub mod report;
+pub mod settings;
 pub mod trace;
 pub mod verifier;
 

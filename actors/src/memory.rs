@@ -2,7 +2,7 @@
 
 use crate::message::{EPISODE, Message, PERCEPTION, View};
 use acm_concept::{camera::RgbdFrame, time::Time};
-use acm_memory::{Memory, observation::Observation};
+use acm_memory::{Memory, event::Event, observation::Observation};
 use acm_runtime::{
     core::{Core, CoreError, Outbox},
     envelope::Envelope,
@@ -23,12 +23,17 @@ pub struct MemoryActor {
     memory: Weak<Mutex<Box<dyn Memory>>>,
     bus: Arc<dyn FrameBus<RgbdFrame>>,
     observer: Option<Arc<dyn MemoryObserver>>,
+    donated: Arc<[Event]>,
 }
 
 impl MemoryActor {
     /// An actor that writes `memory` and finds the frames behind percepts on `bus`.
     pub fn new(memory: Weak<Mutex<Box<dyn Memory>>>, bus: Arc<dyn FrameBus<RgbdFrame>>) -> MemoryActor {
-        MemoryActor { memory, bus, observer: None }
+        MemoryActor { memory, bus, observer: None, donated: Arc::default() }
+    }
+    /// What another memory came to, for the fault that puts it in this one's place.
+    pub fn donated(self, donated: Arc<[Event]>) -> MemoryActor {
+        MemoryActor { donated, ..self }
     }
     /// Tells `observer` of every change.
     pub fn observed_by(self, observer: Option<Arc<dyn MemoryObserver>>) -> MemoryActor {
@@ -58,6 +63,7 @@ impl Core<Message> for MemoryActor {
             }
             Message::Note(note) => memory.note(&note).map(|()| kept(&**memory, None)),
             Message::Wipe => memory.wipe().map(|()| kept(&**memory, None)),
+            Message::Transplant => memory.transplant(&self.donated).map(|()| kept(&**memory, None)),
             Message::Record(executed) => memory.record(&executed).map(|id| kept(&**memory, Some(id))),
             Message::Settle { transition, verdict } => {
                 memory.settle(transition, &verdict).map(|()| kept(&**memory, Some(transition)))

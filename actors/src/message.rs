@@ -133,6 +133,8 @@ pub enum Message {
     Note(Note),
     /// episode -> memory: forget everything (a fault set for a test).
     Wipe,
+    /// episode -> memory: forget everything and believe what another memory came to (a fault set for a test).
+    Transplant,
     /// episode -> memory: keep a finished skill.
     Record(Box<Executed>),
     /// episode -> memory: the verifier's answer on a transition.
@@ -271,6 +273,7 @@ impl Payload for Message {
             Message::Updated { .. } => "updated",
             Message::Note(_) => "note",
             Message::Wipe => "wipe",
+            Message::Transplant => "transplant",
             Message::Record(_) => "record",
             Message::Settle { .. } => "settle",
             Message::Kept { .. } => "kept",

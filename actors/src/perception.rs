@@ -1,6 +1,9 @@
 //! The perception actor: asks for a frame and grounds it against what memory expects.
 
-use crate::message::{EPISODE, HOST, MEMORY, Message};
+use crate::{
+    message::{EPISODE, HOST, MEMORY, Message},
+    settings::Turning,
+};
 use acm_concept::{camera::RgbdFrame, embodiment::RobotDescription, expectation::Expectation};
 use acm_perception::Grounder;
 use acm_runtime::{
@@ -12,7 +15,7 @@ use std::sync::Arc;
 
 /// The perception actor.
 pub struct PerceptionActor {
-    grounder: Arc<Grounder>,
+    grounder: Turning<Arc<Grounder>>,
     robot: RobotDescription,
     bus: Arc<dyn FrameBus<RgbdFrame>>,
     /// The expectation for the frame that was asked for.
@@ -21,7 +24,11 @@ pub struct PerceptionActor {
 
 impl PerceptionActor {
     /// An actor that grounds with `grounder` and takes frames from `bus`.
-    pub fn new(grounder: Arc<Grounder>, robot: RobotDescription, bus: Arc<dyn FrameBus<RgbdFrame>>) -> PerceptionActor {
+    pub fn new(
+        grounder: Turning<Arc<Grounder>>,
+        robot: RobotDescription,
+        bus: Arc<dyn FrameBus<RgbdFrame>>,
+    ) -> PerceptionActor {
         PerceptionActor { grounder, robot, bus, expectation: None }
     }
 }
@@ -44,7 +51,7 @@ impl Core<Message> for PerceptionActor {
                 let mut expectation = self.expectation.take().unwrap_or_default();
                 expectation.time = header.time;
                 expectation.robot = self.robot.body(&feedback);
-                let percepts = Box::new(self.grounder.ground(&frame, &expectation));
+                let percepts = Box::new(self.grounder.now().ground(&frame, &expectation));
                 outbox.send(MEMORY, Message::Percepts { percepts, feedback });
             }
             other => return Err(CoreError(format!("perception cannot handle {other:?}"))),

@@ -7,6 +7,7 @@
 use crate::{
     message::{EPISODE, LLM, Message},
     report::Reading,
+    settings::Turning,
 };
 use acm_concept::{embodiment::RobotDescription, template::TemplateLibrary};
 use acm_llm::{Answer, ChatRequest, Dialogue, Next, Parameters, PromptId, Turn};
@@ -25,7 +26,7 @@ pub struct PlannerActor {
     planner: Arc<Planner>,
     library: Arc<TemplateLibrary>,
     robot: RobotDescription,
-    options: PlanOptions,
+    options: Turning<PlanOptions>,
     /// Whether a language model reads the instruction.
     hybrid: bool,
     asked: Option<Asked>,
@@ -43,7 +44,7 @@ impl PlannerActor {
         planner: Arc<Planner>,
         library: Arc<TemplateLibrary>,
         robot: RobotDescription,
-        options: PlanOptions,
+        options: Turning<PlanOptions>,
     ) -> PlannerActor {
         PlannerActor { planner, library, robot, options, hybrid: false, asked: None }
     }
@@ -128,7 +129,7 @@ impl Core<Message> for PlannerActor {
                 return Ok(());
             }
             Message::Decide { task, situation, view } => {
-                let decision = self.planner.decide(&task, &*view.0, &situation, &self.options);
+                let decision = self.planner.decide(&task, &*view.0, &situation, self.options.now());
                 match &decision {
                     Decision::Act { step, .. } => match self.planner.bind(step, &*view.0, &self.robot) {
                         Ok(invocation) => {

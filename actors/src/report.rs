@@ -102,7 +102,8 @@ impl fmt::Display for Reading {
             None => write!(f, "read by the model {model} ({backend})")?,
             Some(reason) => write!(f, "READ BY RULES INSTEAD OF THE MODEL: {reason}")?,
         }
-        write!(f, "; {} calls, {}", self.calls, self.usage)
+        let calls = if self.calls == 1 { "call" } else { "calls" };
+        write!(f, "; {} {calls}, {}", self.calls, self.usage)
     }
 }
 

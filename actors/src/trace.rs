@@ -8,10 +8,12 @@
 //! | [`frames`] | the frames that the camera gave, by hash, and their pixels as far as they are wanted |
 //! | [`delta`] | what memory appended, with what was believed before and after |
 //! | [`words`] | one line for a person on every message |
-//! | [`viewer`] | images, calibration, transforms and lines in the form that robot viewers read |
+//! | [`points`] | a frame as a cloud of points |
+//! | [`viewer`] | images, clouds, calibration, transforms and lines in the form that robot viewers read |
 
 pub mod delta;
 pub mod frames;
+pub mod points;
 pub mod viewer;
 pub mod words;
 

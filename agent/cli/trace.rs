@@ -25,7 +25,7 @@ pub enum TraceCommand {
     Repair(TraceRepairArgs),
     /// Why a message was sent: the decision behind it, what that rested on, what wrote that, and the frames seen.
     Why(TraceWhyArgs),
-    /// The run for other tools: a page, lines of JSON, Chrome's trace events, point clouds.
+    /// The run for other tools: a page, lines of JSON, Chrome's trace events, point clouds, spans.
     Export(TraceExportArgs),
     /// The viewer, served to the browser on this machine.
     View(TraceViewArgs),
@@ -82,10 +82,13 @@ pub struct TraceReplayArgs {
 #[derive(Debug, Clone, Default, Args)]
 #[group(requires = "fork")]
 pub struct Otherwise {
-    /// A further fault. Black and frozen frames begin at the fork.
+    /// A further fault. Those of the cameras begin at the fork, and count frames from there.
     #[arg(long, value_name = "FAULT")]
     pub inject: Vec<Injection>,
-    /// What to do when memory cannot decide.
+    /// What the agent goes by from the fork on: a TOML file, as `acm run --config`.
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// What to do from the fork on when memory cannot decide.
     #[arg(long, value_enum)]
     pub on_unknown: Option<OnUnknownArg>,
     /// Another language model for what is asked after the fork, as `acm run --llm`; the run's own if absent.
@@ -181,6 +184,9 @@ pub struct TraceExportArgs {
     /// What a language model was asked and replied, as a cassette for `acm run --llm replay=FILE`.
     #[arg(long, value_name = "FILE")]
     pub cassette: Option<PathBuf>,
+    /// Spans of OpenTelemetry, sent to the collector at this http:// address, or written to this file as OTLP/JSON.
+    #[arg(long, value_name = "URL|FILE")]
+    pub otlp: Option<String>,
     /// A point cloud (PLY) of each frame; needs a trace with --trace-frames full.
     #[arg(long, value_name = "FOLDER")]
     pub points: Option<PathBuf>,

@@ -139,7 +139,8 @@ pub fn tell(entry: &Entry, out: &mut impl Write) -> anyhow::Result<bool> {
             writeln!(out, "the answer's schema: `--json` has it")?;
         }
         REPLIED => match serde_json::from_value(body)? {
-            Answer::Error(error) => writeln!(out, "no reply: {error}")?,
+            // The line of the message has told it.
+            Answer::Error(_) => {}
             Answer::Reply(reply) => {
                 writeln!(out, "{} ({}), {}, ended: {:?}", reply.model, reply.backend, reply.usage, reply.end)?;
                 if let Some(reasoning) = &reply.reasoning {

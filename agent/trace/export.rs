@@ -6,10 +6,12 @@
 //! | [`chrome`] | trace events of Chrome, which Perfetto reads |
 //! | [`super::calls`] | the calls of a language model as a cassette |
 //! | [`points`] | point clouds in the world, as PLY |
+//! | [`otlp`] | spans of OpenTelemetry, in a file or sent to a collector |
 //! | [`super::page`] | the viewer as one HTML file |
 
 pub mod chrome;
 pub mod lines;
+pub mod otlp;
 pub mod points;
 
 use super::{calls, page, run_file::RunFile};
@@ -23,9 +25,11 @@ use std::{
 
 /// Runs `acm trace export`.
 pub fn run(args: &TraceExportArgs) -> anyhow::Result<Exit> {
-    let TraceExportArgs { file, html, jsonl, chrome, cassette, points, frame } = args;
-    if [html, jsonl, chrome, cassette, points].iter().all(|form| form.is_none()) {
-        bail!("say in which form: --html FILE, --jsonl FILE, --chrome FILE, --cassette FILE or --points FOLDER");
+    let TraceExportArgs { file, html, jsonl, chrome, cassette, points, frame, otlp } = args;
+    if [html, jsonl, chrome, cassette, points].iter().all(|form| form.is_none()) && otlp.is_none() {
+        bail!(
+            "say in which form: --html FILE, --jsonl FILE, --chrome FILE, --cassette FILE, --points FOLDER or --otlp URL"
+        );
     }
     let mut cut = None;
     if let Some(path) = html {
@@ -59,6 +63,9 @@ pub fn run(args: &TraceExportArgs) -> anyhow::Result<Exit> {
     if let Some(folder) = points {
         let written = points::write(file, folder, *frame)?;
         eprintln!("acm: {written} point clouds in {}", folder.display());
+    }
+    if let Some(target) = otlp {
+        cut = otlp::export(file, target)?;
     }
     if let Some(reason) = cut {
         eprintln!("acm: {} is cut ({reason}); what stands before is written", file.display());

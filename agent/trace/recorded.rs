@@ -3,15 +3,16 @@
 use super::{
     calls,
     picture::{self, Picture},
-    recording::MEMORY_FOLDER,
+    recording::{DONOR_FOLDER, MEMORY_FOLDER},
     replay::run_arguments,
     run_file::{Entry, Header, RunFile},
 };
-use crate::{cli::RunArgs, llm::LlmId};
+use crate::{cli::RunArgs, inject::Injection, llm::LlmId};
 use acm_actors::{
     host::Outside,
     message::HOST,
     replay::{Answer, outside},
+    settings::Settings,
 };
 use acm_concept::{embodiment::RobotDescription, ids::FrameId, task::TaskSpec, time::Time};
 use acm_llm::Cassette;
@@ -42,6 +43,7 @@ struct Options {
     arguments: Vec<String>,
     #[serde(default)]
     keeps_memory: bool,
+    settings: Option<Settings>,
 }
 
 impl Recorded {
@@ -95,16 +97,31 @@ impl Recorded {
         self.file("task.json")
     }
 
-    /// What the run was told on the command line.
+    /// What the run was told on the command line, with `donor` in the place of the folder of a memory that a fault put
+    /// into the place of the run's own: the folder itself may have changed or gone.
     ///
     /// # Errors
     /// The run was not started there.
-    pub fn arguments(&self) -> anyhow::Result<RunArgs> {
+    pub fn arguments(&self, donor: Option<&Path>) -> anyhow::Result<RunArgs> {
         let options: Options = self.file("options.json")?;
         if options.arguments.is_empty() {
             bail!("the trace does not say how its run was started: it was not started by `acm run`");
         }
-        run_arguments(&options.arguments)
+        let mut run = run_arguments(&options.arguments)?;
+        for injection in &mut run.inject {
+            if let (Injection::TransplantMemory { donor: folder, .. }, Some(donor)) = (injection, donor) {
+                *folder = donor.to_path_buf();
+            }
+        }
+        Ok(run)
+    }
+
+    /// What the agent went by; none in a trace that does not say it.
+    ///
+    /// # Errors
+    /// It is malformed.
+    pub fn settings(&self) -> anyhow::Result<Option<Settings>> {
+        Ok(self.file::<Options>("options.json")?.settings)
     }
 
     /// The model that replies as it did in a run with `id`; `None` where the rules read the instructions.
@@ -124,20 +141,31 @@ impl Recorded {
     /// The memory was too large for the trace, or the folder cannot be written.
     pub fn memory(&self) -> anyhow::Result<Option<tempfile::TempDir>> {
         let options: Options = self.file("options.json")?;
-        if !options.keeps_memory {
-            return Ok(None);
-        }
+        options.keeps_memory.then(|| self.folder(MEMORY_FOLDER)).transpose()
+    }
+
+    /// A folder with the memory that a fault put into the place of the run's own; `None` where there was no such fault.
+    ///
+    /// # Errors
+    /// As [`Recorded::memory`].
+    pub fn donor(&self) -> anyhow::Result<Option<tempfile::TempDir>> {
+        let attached = self.attached.keys().any(|name| name.starts_with(DONOR_FOLDER));
+        attached.then(|| self.folder(DONOR_FOLDER)).transpose()
+    }
+
+    /// The attached files whose names begin with a folder, in a folder of their own.
+    fn folder(&self, of: &str) -> anyhow::Result<tempfile::TempDir> {
         let folder = tempfile::tempdir()?;
         if self.attached.contains_key(super::recording::MEMORY_LEFT_OUT) {
             bail!("the memory that the run began with was too large for its trace: the run cannot be repeated");
         }
-        let files = self.attached.iter().filter_map(|(name, data)| Some((name.strip_prefix(MEMORY_FOLDER)?, data)));
+        let files = self.attached.iter().filter_map(|(name, data)| Some((name.strip_prefix(of)?, data)));
         for (name, data) in files {
             // Of a name from a file only the last part is trusted.
             let name = Path::new(name).file_name().context("a file of the memory has no name")?;
             std::fs::write(folder.path().join(name), data)?;
         }
-        Ok(Some(folder))
+        Ok(folder)
     }
 
     /// The world that answers as it did.

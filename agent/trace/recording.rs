@@ -17,6 +17,8 @@ pub const RESULT: &str = "acm.result";
 
 /// How the names of attachments with the memory that a run began with begin.
 pub const MEMORY_FOLDER: &str = "memory/";
+/// The same of the memory that a fault puts into its place.
+pub const DONOR_FOLDER: &str = "donor/";
 /// An attachment in place of a memory that is too large to be kept.
 pub const MEMORY_LEFT_OUT: &str = "memory-left-out";
 /// Most bytes of such a memory.
@@ -105,8 +107,11 @@ impl Recording {
         let about: BTreeMap<String, String> = about.map(|(name, value)| (name.into(), value.into())).into();
         writer.metadata(RUN, about)?;
         writer.attach("options.json", "application/json", &options)?;
-        if let Some(folder) = &config.memory {
-            attach_memory(&writer, folder)?;
+        let donor = config.faults.transplant.as_ref().map(|(donor, _)| donor);
+        for (folder, name) in [(config.memory.as_ref(), MEMORY_FOLDER), (donor, DONOR_FOLDER)] {
+            if let Some(folder) = folder {
+                attach_memory(&writer, folder, name)?;
+            }
         }
         writer.flush()?;
         Ok(Recording { trace: Arc::new(Trace::new(writer, request.frames)?) })
@@ -137,8 +142,8 @@ impl Recording {
     }
 }
 
-/// Keeps the memory that a run goes on with, so that it can be run again.
-fn attach_memory(writer: &TraceWriter, folder: &Path) -> anyhow::Result<()> {
+/// Keeps a memory that a run goes on with, so that it can be run again.
+fn attach_memory(writer: &TraceWriter, folder: &Path, as_folder: &str) -> anyhow::Result<()> {
     // A memory that is not there yet is made by the run.
     let Ok(entries) = std::fs::read_dir(folder) else { return Ok(()) };
     let mut files: Vec<PathBuf> = entries.filter_map(|entry| entry.ok().map(|entry| entry.path())).collect();
@@ -151,7 +156,7 @@ fn attach_memory(writer: &TraceWriter, folder: &Path) -> anyhow::Result<()> {
     for path in files {
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let data = std::fs::read(&path).with_context(|| format!("{} cannot be read", path.display()))?;
-        writer.attach(&format!("{MEMORY_FOLDER}{name}"), "application/octet-stream", &data)?;
+        writer.attach(&format!("{as_folder}{name}"), "application/octet-stream", &data)?;
     }
     Ok(())
 }
@@ -162,7 +167,7 @@ fn options(world: &str, config: &EpisodeConfig) -> serde_json::Value {
         "scenario": world,
         "arguments": config.arguments,
         "method": config.method,
-        "on_unknown": config.on_unknown,
+        "settings": config.settings,
         "instruction": config.instruction,
         "keeps_memory": config.memory.is_some(),
         "faults": format!("{:?}", config.faults),

@@ -13,11 +13,11 @@ use super::{
 use crate::{
     cli::{Exit, RunArgs, trace::TraceReplayArgs},
     episode::{EpisodeConfig, Runner},
-    inject::{Faults, Signal},
+    inject::Faults,
     llm::Llm,
     run::prepare,
 };
-use acm_actors::{message::Message, trace::words};
+use acm_actors::{message::Message, settings::Signal, trace::words};
 use acm_runtime::{
     envelope::{Envelope, OUTSIDE},
     journal::{Journal, JournalError},
@@ -116,7 +116,8 @@ fn tell(divergence: &Divergence, out: &mut impl Write) -> io::Result<()> {
 /// # Errors
 /// The trace does not hold what the replay needs.
 pub fn replay(recorded: &Recorded, args: &TraceReplayArgs) -> anyhow::Result<Outcome> {
-    let mut run = recorded.arguments()?;
+    let donor = recorded.donor()?;
+    let mut run = recorded.arguments(donor.as_ref().map(tempfile::TempDir::path))?;
     // What a model replied is in the trace: its files need not be there.
     let llm = recorded.llm(std::mem::take(&mut run.llm))?.map(Llm::Cassette);
     let (config, library) = prepare(&run)?;
@@ -125,7 +126,11 @@ pub fn replay(recorded: &Recorded, args: &TraceReplayArgs) -> anyhow::Result<Out
     let journal = Arc::clone(&comparison) as Arc<dyn Journal<Message>>;
     let seed = recorded.seed()?;
     let memory = recorded.memory()?;
-    let config = EpisodeConfig { memory: memory.as_ref().map(|folder| folder.path().to_path_buf()), ..config };
+    let config = EpisodeConfig {
+        memory: memory.as_ref().map(|folder| folder.path().to_path_buf()),
+        settings: recorded.settings()?.unwrap_or(config.settings),
+        ..config
+    };
     let (ended, renderer) = if args.resim {
         let name = run.scenario.as_deref().context("the run was on a robot in another process: it has no simulator")?;
         let scenario = Scenario::open_with(name, &run.set)?;
@@ -138,7 +143,8 @@ pub fn replay(recorded: &Recorded, args: &TraceReplayArgs) -> anyhow::Result<Out
         let runner = Runner::without_renderer(library)?;
         runner.end_on_ctrl_c();
         // What befell the cameras and the robot is in what they gave; what befell the agent befalls it again.
-        let faults = Faults { wipe_at: config.faults.wipe_at, panic_at: config.faults.panic_at, ..Faults::default() };
+        let Faults { wipe_at, transplant, panic_at, .. } = config.faults;
+        let faults = Faults { wipe_at, transplant, panic_at, ..Faults::default() };
         let config = EpisodeConfig { faults, no_motion: false, ..config };
         (runner.live(recorded.task()?, outside, seed, &config, journal, None).map(|_| ()), String::new())
     };

@@ -53,7 +53,7 @@ pub use hand::HandFeeling;
 pub use identity::{IdentityRule, MAX_PERCEPTS};
 pub use joint::FeltJoint;
 pub use library::{LibraryError, MAX_TEMPLATE_FILES, default_library, library_from_dir};
-pub use log::{FORMAT, MAX_LOG_BYTES};
+pub use log::{FORMAT, MAX_LOG_BYTES, read_events};
 pub use memory::AcmMemory;
 pub use recent::{MAX_RECENT, Recent};
 pub use state::{MAX_HISTORY, MAX_OBJECTS, MAX_SKILLS, MAX_TRANSITIONS};

@@ -203,6 +203,20 @@ impl Memory for AcmMemory {
         self.recent.add(events);
         Ok(())
     }
+    fn transplant(&mut self, donated: &[Event]) -> Result<(), MemoryError> {
+        let (moment, source) = (self.state.moment(), Source::Agent);
+        let wiped = Event { moment, source, evidence: Vec::new(), change: Change::Wiped(Counters::default()) };
+        let events: Vec<Event> = std::iter::once(wiped).chain(donated.iter().cloned()).collect();
+        let mut state = State::default();
+        let fault = events.iter().try_for_each(|event| state.apply(event)).err();
+        self.check(&events, fault)?;
+        if let Some(log) = &mut self.log {
+            log.replace(&events)?;
+        }
+        self.state = state;
+        self.recent.add(events);
+        Ok(())
+    }
     fn view(&self) -> Arc<dyn MemoryView> {
         Arc::new(self.snapshot())
     }

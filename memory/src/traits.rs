@@ -2,6 +2,7 @@
 
 use crate::{
     entry::{ObjectEntry, SkillEntry, TaskProgress, Transition},
+    event::Event,
     joint::{self, FeltJoint},
     observation::{Executed, Grounding, Note, Observation, Verdict},
     query::{Applicability, ObjectQuery, PlaceReference, Prediction, Recall, Retrieval, SkillCandidate},
@@ -57,6 +58,15 @@ pub enum MemoryError {
         /// The folder.
         path: PathBuf,
     },
+    /// A folder that holds no memory.
+    #[error("{path} holds no memory: it has no events.log")]
+    Missing {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// A memory that is no sum of events.
+    #[error("the memory `{0}` cannot take another one's content")]
+    NotTransplantable(String),
     /// A transition that memory does not know.
     #[error("there is no transition {0}")]
     UnknownTransition(TransitionId),
@@ -78,6 +88,12 @@ pub trait Memory: Send {
     fn note(&mut self, note: &Note) -> Result<(), MemoryError>;
     /// Forgets everything dynamic: objects, scene, transitions, skills, progress.
     fn wipe(&mut self) -> Result<(), MemoryError>;
+    /// Forgets everything dynamic and believes what another memory of this kind came to by its events, as a fault for
+    /// tests; see [`read_events`](crate::read_events). Nothing is begun by it: the caller notes the run and the
+    /// instruction anew.
+    fn transplant(&mut self, _events: &[Event]) -> Result<(), MemoryError> {
+        Err(MemoryError::NotTransplantable(self.name().into()))
+    }
     /// An immutable view of the present state; cheap to take.
     fn view(&self) -> Arc<dyn MemoryView>;
     /// The events that came after the first `known` ones since this memory was opened: what changed, for whoever

@@ -1,8 +1,11 @@
 //! The thresholds of the pipeline, in one place.
 
+use serde::{Deserialize, Serialize};
+
 /// Thresholds of a [`Grounder`](crate::Grounder). The defaults hold for D435- and Kinect-class cameras that look at
 /// a table from 0.4 to 2 m; lengths in metres, angles in radians, colour differences in units of CIELAB.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct GrounderConfig {
     /// Seed of the sampling in the plane search. The same frame and seed give the same answer.
     pub seed: u64,
@@ -95,6 +98,53 @@ impl Default for GrounderConfig {
 }
 
 impl GrounderConfig {
+    /// Whether the values mean something: lengths, angles and factors that are positive numbers, shares from 0 to 1.
+    ///
+    /// # Errors
+    /// The first field that does not, with its value.
+    pub fn check(&self) -> Result<(), String> {
+        let positive = [
+            ("depth_min_m", f64::from(self.depth_min_m)),
+            ("depth_max_m", f64::from(self.depth_max_m)),
+            ("noise_m", self.noise_m),
+            ("noise_floor_m", self.noise_floor_m),
+            ("max_support_tilt_rad", self.max_support_tilt_rad),
+            ("upright_tolerance_rad", self.upright_tolerance_rad),
+            ("robot_margin_m", self.robot_margin_m),
+            ("min_height_m", f64::from(self.min_height_m)),
+            ("max_height_m", f64::from(self.max_height_m)),
+            ("patch_contrast", f64::from(self.patch_contrast)),
+            ("min_patch_m", self.min_patch_m),
+            ("outline_sigma_px", self.outline_sigma_px),
+            ("noun_boost", self.noun_boost),
+            ("memory_boost", self.memory_boost),
+            ("sigma_factor", self.sigma_factor),
+            ("sigma_floor_m", self.sigma_floor_m),
+        ];
+        let shares = [
+            ("min_depth_fraction", self.min_depth_fraction),
+            ("min_support_fraction", self.min_support_fraction),
+            ("sigma_range", self.sigma_range),
+            ("min_confidence", self.min_confidence),
+        ];
+        let counts = [
+            ("min_segment_px", self.min_segment_px),
+            ("max_objects", self.max_objects),
+            ("max_fit_points", self.max_fit_points),
+            ("max_fit_outline", self.max_fit_outline),
+        ];
+        let odd = |name: &str, value: f64, range: &str| Err(format!("{name} is {value}: it must be {range}"));
+        if let Some((name, value)) = positive.into_iter().find(|(_, value)| !(value.is_finite() && *value > 0.0)) {
+            return odd(name, value, "a positive number");
+        }
+        if let Some((name, value)) = shares.into_iter().find(|(_, value)| !(0.0..=1.0).contains(value)) {
+            return odd(name, value, "from 0 to 1");
+        }
+        if let Some((name, value)) = counts.into_iter().find(|(_, value)| !(1..=1_000_000).contains(value)) {
+            return odd(name, value as f64, "from 1 to a million");
+        }
+        Ok(())
+    }
     /// Standard deviation of a depth of `z` metres, metres.
     pub fn depth_sigma_m(&self, z: f64) -> f64 {
         (self.noise_m * z * z).max(self.noise_floor_m)

@@ -1,8 +1,8 @@
 //! `acm trace export`: what other tools read is what the trace has.
 
 use crate::{
-    acm, refuses,
-    trace::{prints, trace},
+    refuses,
+    trace::{full_trace, prints, trace},
 };
 use serde_json::Value;
 use std::{collections::BTreeMap, fs};
@@ -68,22 +68,8 @@ fn vertices(bytes: &[u8]) -> Vec<([f32; 3], [u8; 3])> {
 #[test]
 fn point_clouds_stand_where_the_things_stand() {
     let dir = tempfile::tempdir().unwrap();
-    let (file, clouds) = (dir.path().join("full.mcap"), dir.path().join("clouds"));
-    let (file, folder) = (file.to_str().unwrap(), clouds.to_str().unwrap());
-    let run = [
-        "run",
-        "put-back-block",
-        "--seed",
-        "3",
-        "--json",
-        "--method",
-        "acm",
-        "--trace-frames",
-        "full",
-        "--trace",
-        file,
-    ];
-    assert!(acm().args(run).output().unwrap().status.success());
+    let clouds = dir.path().join("clouds");
+    let (file, folder) = (full_trace().to_str().unwrap(), clouds.to_str().unwrap());
     prints(&["trace", "export", file, "--points", folder, "--frame", "F0"]);
     let files: Vec<_> = fs::read_dir(&clouds).unwrap().map(|entry| entry.unwrap().file_name()).collect();
     assert_eq!(files, ["F0.ply"]);

@@ -84,7 +84,7 @@ fn a_model_reads_the_instruction_and_all_it_says_can_be_shown_given_again_and_re
         "reasoning = \"a cube, so a thing that can be moved\"\nusage = { input = 812, output = 97, reasoning = 11 }";
     let script = script(dir.path(), "right.toml", &right(extra));
     let (told, code) = run(&script, &first, &[]);
-    assert!(told.contains("read      read by the model parrot-1 (scripted); 1 calls, 812 tokens in, 97 out"), "{told}");
+    assert!(told.contains("read      read by the model parrot-1 (scripted); 1 call, 812 tokens in, 97 out"), "{told}");
     assert_eq!(code, Some(0), "{told}");
 
     // Prompt and reply for a person.

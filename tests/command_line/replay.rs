@@ -130,6 +130,57 @@ fn a_fork_is_the_recorded_run_up_to_a_message_and_another_one_from_there() {
 }
 
 #[test]
+fn a_fork_goes_by_other_settings_from_its_message_on() {
+    let dir = tempfile::tempdir().unwrap();
+    let settings = dir.path().join("blind.toml");
+    // No depth is ever so complete: every frame counts as blind.
+    fs::write(&settings, "[perception]\nmin_depth_fraction = 1.0\n").unwrap();
+    let words = ["trace", "replay", text(&runs().full), "--fork", "900", "--config", text(&settings)];
+    let output = acm().args(words).output().unwrap();
+    let told = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(told.starts_with("as recorded up to message 900, then live"), "{told}");
+    assert_eq!(output.status.code(), Some(3), "{told}");
+    // What changes nothing changes nothing.
+    let guess = ["trace", "replay", text(&runs().full), "--fork", "900", "--on-unknown", "guess"];
+    assert!(prints(&guess).starts_with("as recorded up to message 900, then live"));
+    fs::write(&settings, "[perception]\nmin_depth_fractoin = 1.0\n").unwrap();
+    refuses(&words, &["line 2", "min_depth_fractoin"]);
+}
+
+#[test]
+fn a_run_with_a_configuration_is_replayed_without_its_file() {
+    let dir = tempfile::tempdir().unwrap();
+    let (settings, path) = (dir.path().join("sure.toml"), dir.path().join("sure.mcap"));
+    fs::write(&settings, "on_unknown = \"guess\"\n[perception]\nmin_confidence = 0.5\n").unwrap();
+    let words =
+        ["run", "put-back-block", "--seed", "3", "--json", "--trace-frames", "full", "--config", text(&settings)];
+    let output = acm().args(words).arg("--trace").arg(&path).output().unwrap();
+    assert!(String::from_utf8_lossy(&output.stdout).contains("\"on_unknown\": \"guess\""));
+    fs::remove_file(&settings).unwrap();
+    assert!(prints(&["trace", "replay", text(&path)]).starts_with("identical: "));
+}
+
+#[test]
+fn a_fork_goes_on_with_another_memory_and_is_replayed_without_its_folder() {
+    let dir = tempfile::tempdir().unwrap();
+    let (donor, forked) = (dir.path().join("donor"), dir.path().join("forked.mcap"));
+    acm().args(["run", "put-back-block", "--seed", "4", "--json", "--memory", text(&donor)]).output().unwrap();
+    let fault = format!("transplant-memory={}@first-verified-place", donor.display());
+    let words = ["trace", "replay", text(&runs().full), "--fork", "700", "--inject", &fault, "--trace", text(&forked)];
+    let output = acm().args(words).output().unwrap();
+    let told = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(told.starts_with("as recorded up to message 700, then live"), "{told}");
+    assert!(prints(&["trace", "show", text(&forked), "--kind", "transplant"]).contains("episode > memory"));
+
+    let path = dir.path().join("transplanted.mcap");
+    let words = ["run", "put-back-block", "--seed", "3", "--json", "--trace-frames", "full", "--inject", &fault];
+    acm().args(words).arg("--trace").arg(&path).output().unwrap();
+    fs::remove_dir_all(&donor).unwrap();
+    assert!(prints(&["trace", "replay", text(&path)]).starts_with("identical: "));
+    refuses(&words, &["holds no memory", text(&donor)]);
+}
+
+#[test]
 fn a_trace_without_pixels_is_replayed_with_its_world_only() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("hash.mcap");

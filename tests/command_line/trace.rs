@@ -26,6 +26,19 @@ pub fn trace() -> &'static Path {
     path
 }
 
+/// A trace of one run with all pixels, for all tests.
+pub fn full_trace() -> &'static Path {
+    static TRACE: OnceLock<(tempfile::TempDir, PathBuf)> = OnceLock::new();
+    let (_, path) = TRACE.get_or_init(|| {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("full.mcap");
+        let run = ["run", "put-back-block", "--seed", "3", "--json", "--trace-frames", "full", "--trace"];
+        assert!(acm().args(run).arg(&path).output().unwrap().status.success());
+        (dir, path)
+    });
+    path
+}
+
 pub fn prints(arguments: &[&str]) -> String {
     let output = acm().args(arguments).output().unwrap();
     assert_eq!(output.status.code(), Some(0), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
@@ -174,33 +187,6 @@ fn a_video_is_a_gif_of_a_bounded_size_and_bad_requests_cost_nothing() {
     run(&["--video", "run.mp4"], &["run.mp4", ".gif"]);
     run(&["--video", "no/such/run.gif"], &["no/such/run.gif", "cannot be created"]);
     run(&["--seed", "0..3", "--video", "run.gif"], &["one --seed"]);
-}
-
-/// The project's own reader and the one that others use must agree. `scripts/setup.sh` installs the latter.
-#[test]
-fn another_programs_reader_finds_the_same_messages() {
-    let build = Path::new(env!("CARGO_BIN_EXE_acm")).ancestors().nth(2).unwrap();
-    let python = build.join("python/bin/python");
-    if !python.exists() {
-        println!(
-            "skipped: {} is missing; scripts/setup.sh makes it where Python and a network are there",
-            python.display()
-        );
-        return;
-    }
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/read_trace.py");
-    let output = std::process::Command::new(python).arg(script).arg(trace()).output().unwrap();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let read: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-    let ours: serde_json::Value =
-        serde_json::from_str(&prints(&["trace", "show", trace().to_str().unwrap(), "--json"])).unwrap();
-    assert_eq!(read["messages"], ours["messages"]);
-    assert_eq!(read["run"], ours["run"]);
-    assert_eq!(read["attachments"], serde_json::json!(["options.json", "robot.json", "task.json"]));
-    let frames = read["frames"].as_array().unwrap();
-    assert!(!frames.is_empty() && frames.len() == read["thumbnails"].as_array().unwrap().len());
-    assert!(read["thumbnails"].as_array().unwrap().iter().all(|size| *size == serde_json::json!([160, 120])));
-    assert_eq!(read["lines"], ours["messages"].as_array().unwrap().len());
 }
 
 #[test]

@@ -27,6 +27,7 @@ pub(super) enum Doing {
     Verifying,
     Settling(Outcome),
     Wiping,
+    Transplanting,
     Ended,
 }
 
@@ -37,16 +38,25 @@ pub(super) struct Pending {
     pub looks: u32,
 }
 
-/// The event at which memory is wiped, as a fault for tests.
+/// What is to befall memory once in an episode, as a fault for tests.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Upheavals {
+    /// When everything is forgotten.
+    pub wipe_at: Option<FaultEvent>,
+    /// When another memory's content takes the place of its own.
+    pub transplant_at: Option<FaultEvent>,
+}
+
+/// An event at which something befalls memory.
 ///
 /// ```
-/// # use acm_actors::episode::WipeAt;
-/// assert_eq!("first-verified-place".parse(), Ok(WipeAt::FirstVerified("place".into())));
-/// assert_eq!("instruction".parse(), Ok(WipeAt::Instruction));
-/// assert!("noon".parse::<WipeAt>().is_err());
+/// # use acm_actors::episode::FaultEvent;
+/// assert_eq!("first-verified-place".parse(), Ok(FaultEvent::FirstVerified("place".into())));
+/// assert_eq!("instruction".parse(), Ok(FaultEvent::Instruction));
+/// assert!("noon".parse::<FaultEvent>().is_err());
 /// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum WipeAt {
+pub enum FaultEvent {
     /// When the instruction has been given.
     Instruction,
     /// When the first skill of this name was verified.
@@ -90,21 +100,21 @@ impl FromStr for Until {
 #[error("`{0}` is no event: write `instruction` or `first-verified-SKILL`, such as `first-verified-place`")]
 pub struct ParseEventError(String);
 
-impl fmt::Display for WipeAt {
+impl fmt::Display for FaultEvent {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            WipeAt::Instruction => f.write_str("instruction"),
-            WipeAt::FirstVerified(skill) => write!(f, "first-verified-{skill}"),
+            FaultEvent::Instruction => f.write_str("instruction"),
+            FaultEvent::FirstVerified(skill) => write!(f, "first-verified-{skill}"),
         }
     }
 }
 
-impl FromStr for WipeAt {
+impl FromStr for FaultEvent {
     type Err = ParseEventError;
     fn from_str(text: &str) -> Result<Self, ParseEventError> {
         match (text, text.strip_prefix("first-verified-")) {
-            ("instruction", _) => Ok(WipeAt::Instruction),
-            (_, Some(skill)) if !skill.is_empty() => Ok(WipeAt::FirstVerified(skill.into())),
+            ("instruction", _) => Ok(FaultEvent::Instruction),
+            (_, Some(skill)) if !skill.is_empty() => Ok(FaultEvent::FirstVerified(skill.into())),
             _ => Err(ParseEventError(text.into())),
         }
     }

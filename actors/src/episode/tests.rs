@@ -8,7 +8,7 @@ use std::sync::Arc;
 fn episode(instruction_at_s: f64, until: Option<Until>) -> Episode {
     let budgets = Budgets { seconds: 10.0, skills: 3, frames: 30 };
     let task = TaskSpec { instruction: "Wave.".into(), instruction_at_s, budgets, then: vec![], cameras: vec![] };
-    Episode::new(task, None).until(until)
+    Episode::new(task, Upheavals::default()).until(until)
 }
 
 fn handle(episode: &mut Episode, seconds: f64, body: Message) -> Vec<(Role, Message)> {

@@ -1,8 +1,8 @@
-//! What robot viewers read: lines, images, calibration and transforms as Foxglove's protobuf messages.
+//! What robot viewers read: lines, images, point clouds, calibration and transforms as Foxglove's protobuf messages.
 //!
 //! The one place that names that library. Of it we take the message types and their schemas; the file is our own.
 
-use super::words;
+use super::{points, words};
 use crate::message::Message;
 use acm_concept::{
     camera::{FrameHeader, RgbdFrame},
@@ -16,7 +16,8 @@ use acm_runtime::{
 use foxglove::{
     Decode, Encode,
     messages::{
-        CameraCalibration, CompressedImage, FrameTransform, Log, Quaternion, RawImage, Timestamp, Vector3, log::Level,
+        CameraCalibration, CompressedImage, FrameTransform, Log, PackedElementField, PointCloud, Quaternion, RawImage,
+        Timestamp, Vector3, log::Level, packed_element_field::NumericType,
     },
 };
 use image::{ImageFormat, RgbImage, imageops};
@@ -88,10 +89,18 @@ impl Viewer {
     }
 }
 
+/// Where all of a frame goes.
+#[derive(Debug, Clone, Copy)]
+struct FullChannels {
+    color: Channel,
+    depth: Channel,
+    points: Channel,
+}
+
 /// The channels of one camera.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct CameraChannels {
-    raw: Option<(Channel, Channel)>,
+    full: Option<FullChannels>,
     thumbnail: Option<Channel>,
     calibration: Channel,
 }
@@ -105,9 +114,15 @@ impl CameraChannels {
         let topic = |end: &str| format!("/{}/{end}", camera_frame(camera));
         let full = detail == super::FrameDetail::Full;
         let thumbnail = detail == super::FrameDetail::Thumbnail;
-        let raw = |end: &str| channel::<RawImage>(writer, &topic(end));
+        let full_channels = || -> Result<FullChannels, TraceError> {
+            Ok(FullChannels {
+                color: channel::<RawImage>(writer, &topic("color"))?,
+                depth: channel::<RawImage>(writer, &topic("depth"))?,
+                points: channel::<PointCloud>(writer, &topic("points"))?,
+            })
+        };
         Ok(CameraChannels {
-            raw: if full { Some((raw("color")?, raw("depth")?)) } else { None },
+            full: if full { Some(full_channels()?) } else { None },
             thumbnail: if thumbnail { Some(channel::<CompressedImage>(writer, &topic("thumbnail"))?) } else { None },
             calibration: channel::<CameraCalibration>(writer, &topic("calibration"))?,
         })
@@ -118,10 +133,11 @@ impl CameraChannels {
         let time_ns = frame.header.time.0;
         let put = |channel: Channel, bytes: Vec<u8>| writer.put(channel, seq, time_ns, &bytes);
         put(self.calibration, encode(&calibration(&frame.header))?)?;
-        if let Some((color, depth)) = self.raw {
-            put(color, encode(&raw_image(&frame.header, "rgb8", 3, frame.color.to_vec()))?)?;
+        if let Some(channels) = self.full {
+            put(channels.color, encode(&raw_image(&frame.header, "rgb8", 3, frame.color.to_vec()))?)?;
             let metres: &[u8] = bytemuck::cast_slice(&frame.depth);
-            put(depth, encode(&raw_image(&frame.header, "32FC1", 4, metres.to_vec()))?)?;
+            put(channels.depth, encode(&raw_image(&frame.header, "32FC1", 4, metres.to_vec()))?)?;
+            put(channels.points, encode(&point_cloud(frame))?)?;
         }
         if let Some(channel) = self.thumbnail {
             put(channel, encode(&thumbnail(frame)?)?)?;
@@ -201,6 +217,37 @@ fn raw_image(header: &FrameHeader, encoding: &str, pixel_bytes: u32, data: Vec<u
     }
 }
 
+/// The frame's points in its camera's frame, thinned. Each has three 32-bit floats, metres, and four bytes of colour.
+fn point_cloud(frame: &RgbdFrame) -> PointCloud {
+    const POSITION: [&str; 3] = ["x", "y", "z"];
+    const COLOR: [&str; 4] = ["red", "green", "blue", "alpha"];
+    let field = |name: &str, offset: usize, kind: NumericType| PackedElementField {
+        name: name.into(),
+        offset: offset as u32,
+        r#type: kind as i32,
+    };
+    let position = POSITION.iter().enumerate().map(|(i, name)| field(name, 4 * i, NumericType::Float32));
+    let color = COLOR.iter().enumerate().map(|(i, name)| field(name, 12 + i, NumericType::Uint8));
+    let intrinsics = &frame.header.intrinsics;
+    let mut data = Vec::new();
+    for point in points::points(intrinsics, &frame.color, &frame.depth, points::stride(intrinsics)) {
+        data.extend(point.at.as_vec3().to_array().into_iter().flat_map(f32::to_le_bytes));
+        data.extend(point.color);
+        data.push(u8::MAX);
+    }
+    PointCloud {
+        timestamp: Some(timestamp(frame.header.time.0)),
+        frame_id: camera_frame(&frame.header.camera),
+        pose: Some(foxglove::messages::Pose {
+            position: Some(Vector3 { x: 0.0, y: 0.0, z: 0.0 }),
+            orientation: Some(Quaternion { x: 0.0, y: 0.0, z: 0.0, w: 1.0 }),
+        }),
+        point_stride: 16,
+        fields: position.chain(color).collect(),
+        data: data.into(),
+    }
+}
+
 fn thumbnail(frame: &RgbdFrame) -> Result<CompressedImage, JournalError> {
     let (width, height) = (frame.header.intrinsics.width, frame.header.intrinsics.height);
     let image = RgbImage::from_raw(width, height, frame.color.to_vec())
@@ -236,4 +283,40 @@ fn encode<T: Encode>(message: &T) -> Result<Vec<u8>, JournalError> {
     let mut bytes = Vec::with_capacity(message.encoded_len().unwrap_or_default());
     message.encode(&mut bytes).map_err(|e| JournalError(format!("a viewer's message cannot be encoded: {e}")))?;
     Ok(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)] // a failed unwrap is the test's verdict
+    use super::*;
+    use acm_concept::camera::Intrinsics;
+
+    #[test]
+    fn a_point_cloud_holds_the_measured_pixels_in_the_frame_of_their_camera() {
+        let intrinsics = Intrinsics { width: 3, height: 2, fx: 2.0, fy: 2.0, cx: 1.0, cy: 0.0 };
+        let header = FrameHeader {
+            id: acm_concept::ids::FrameId(7),
+            camera: "head".into(),
+            time: acm_concept::time::Time(1_500_000_000),
+            intrinsics,
+            camera_pose: Pose { translation: glam::DVec3::splat(9.0), ..Pose::IDENTITY },
+        };
+        let color: Vec<u8> = (0..18).collect();
+        let depth = vec![0.0, 0.5, 2.0, f32::NAN, -1.0, f32::INFINITY];
+        let frame = RgbdFrame::new(header, color.into(), depth.into()).unwrap();
+        let cloud = PointCloud::decode(&encode(&point_cloud(&frame)).unwrap()[..]).unwrap();
+        assert_eq!((cloud.frame_id.as_str(), cloud.timestamp), ("camera/head", Some(Timestamp::new(1, 500_000_000))));
+        let names: Vec<&str> = cloud.fields.iter().map(|field| field.name.as_str()).collect();
+        assert_eq!(names, ["x", "y", "z", "red", "green", "blue", "alpha"]);
+        let (points, rest) = cloud.data.as_chunks::<16>();
+        assert!(rest.is_empty() && cloud.point_stride == 16);
+        let read = |point: &[u8; 16]| {
+            let metres: Vec<f32> =
+                point[..12].as_chunks::<4>().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
+            (metres, point[12..].to_vec())
+        };
+        // The camera's own frame: where the camera stands makes no difference.
+        let expected = [(vec![0.0, 0.0, 0.5], vec![3, 4, 5, 255]), (vec![1.0, 0.0, 2.0], vec![6, 7, 8, 255])];
+        assert_eq!(points.iter().map(read).collect::<Vec<_>>(), expected);
+    }
 }

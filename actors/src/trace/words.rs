@@ -26,7 +26,9 @@ const MAX_QUOTED: usize = 100;
 pub fn line(message: &Message) -> (Level, String) {
     let level = match message {
         Message::Command(_) | Message::Moved(_) | Message::Sense => Level::Routine,
-        Message::Interrupt | Message::Wipe | Message::Refused { .. } | Message::Broken { .. } => Level::Trouble,
+        Message::Interrupt | Message::Wipe | Message::Transplant | Message::Refused { .. } | Message::Broken { .. } => {
+            Level::Trouble
+        }
         Message::ActorFailed { .. }
         | Message::Retreated { failure: Some(_) }
         | Message::Parsed { task: Err(_), .. } => Level::Trouble,
@@ -40,6 +42,23 @@ pub fn line(message: &Message) -> (Level, String) {
         _ => Level::Normal,
     };
     (level, text(message))
+}
+
+/// Whether a person who watches the run wants to be told of it: what was asked, seen, decided, done and found, and
+/// whatever went wrong. The rest is how the actors ask each other.
+pub fn worth_telling(message: &Message) -> bool {
+    matches!(
+        message,
+        Message::Parse { .. }
+            | Message::AskLlm { .. }
+            | Message::LlmReplied(_)
+            | Message::Parsed { .. }
+            | Message::Updated { .. }
+            | Message::Decided { .. }
+            | Message::SkillEnded(_)
+            | Message::Verdict { .. }
+            | Message::Ended(_)
+    ) || line(message).0 == Level::Trouble
 }
 
 fn text(message: &Message) -> String {
@@ -74,6 +93,7 @@ fn text(message: &Message) -> String {
         }
         Message::Note(note) => note_words(note),
         Message::Wipe => "forget everything".into(),
+        Message::Transplant => "forget everything and believe what another memory came to".into(),
         Message::Record(executed) => format!("keep: {}", skill_words(&executed.report)),
         Message::Settle { transition, verdict } => format!("{transition} {}", verdict_words(verdict)),
         Message::Kept { transition, view } => {

@@ -39,13 +39,22 @@ pub fn wall(trace: &Path) -> anyhow::Result<Took> {
     Ok(took)
 }
 
+/// When the first message was handled, nanoseconds since 1970.
+pub fn begun(took: &Took) -> Option<u64> {
+    took.values().map(|wall| wall.ended_unix_ns.saturating_sub(wall.took_ns)).min()
+}
+
+/// How long the handling of a message took, nanoseconds.
+pub fn took_ns(took: &Took, seq: u64) -> Option<u64> {
+    Some(took.get(&seq)?.took_ns)
+}
+
 /// Writes the events as one JSON object.
 ///
 /// # Errors
 /// They cannot be written.
 pub fn write(run: &RunFile, took: &Took, out: &mut dyn Write) -> anyhow::Result<()> {
-    let begun = took.values().map(|wall| wall.ended_unix_ns.saturating_sub(wall.took_ns)).min().unwrap_or(0);
-    let clock = Clock { took, begun };
+    let clock = Clock { took, begun: begun(took).unwrap_or(0) };
     let mut tracks: BTreeMap<&str, usize> = BTreeMap::new();
     for entry in &run.entries {
         let next = tracks.len() + 1;

@@ -5,6 +5,7 @@ use crate::trace::{
     run_file::RunFile,
     sight,
 };
+use acm_actors::trace::points::points;
 use acm_concept::{camera::FrameHeader, ids::FrameId};
 use anyhow::{Context, bail};
 use image::RgbImage;
@@ -45,8 +46,7 @@ pub fn write(trace: &Path, folder: &Path, only: Option<FrameId>) -> anyhow::Resu
 
 /// Writes the pixels that have a depth as points of the world, metres, with their colours.
 fn cloud(header: &FrameHeader, color: &RgbImage, depth: &[f32], out: &mut impl Write) -> io::Result<()> {
-    let measured = |depth: f32| depth.is_finite() && depth > 0.0;
-    let pixels = || color.enumerate_pixels().zip(depth).filter(|(_, depth)| measured(**depth));
+    let all = || points(&header.intrinsics, color.as_raw(), depth, 1);
     write!(
         out,
         "ply\nformat binary_little_endian 1.0\ncomment frame {} of {} in the world, metres\nelement vertex {}\n\
@@ -54,15 +54,13 @@ fn cloud(header: &FrameHeader, color: &RgbImage, depth: &[f32], out: &mut impl W
          property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n",
         header.id,
         header.camera.replace(['\n', '\r'], " "),
-        pixels().count()
+        all().count()
     )?;
-    for ((column, row, color), depth) in pixels() {
-        let ray = header.intrinsics.ray(f64::from(column), f64::from(row));
-        let point = header.camera_pose.transform_point(ray * f64::from(*depth)).as_vec3();
-        for value in point.to_array() {
+    for point in all() {
+        for value in header.camera_pose.transform_point(point.at).as_vec3().to_array() {
             out.write_all(&value.to_le_bytes())?;
         }
-        out.write_all(&color.0)?;
+        out.write_all(&point.color)?;
     }
     Ok(())
 }

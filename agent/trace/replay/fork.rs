@@ -3,13 +3,14 @@
 use super::{Comparison, Outcome, Recorded, tell};
 use crate::{
     cli::{Exit, trace::TraceReplayArgs},
-    episode::{EpisodeConfig, Runner},
-    inject::{Faults, Signal},
+    config,
+    episode::{EpisodeConfig, Fork, Runner},
+    inject::{Faults, Injection},
     llm::Llm,
     run::{exit_of, prepare, print_judgement},
     trace::recording::TraceRequest,
 };
-use acm_actors::{message::Message, trace::FrameDetail};
+use acm_actors::{message::Message, settings::Signal, trace::FrameDetail};
 use acm_runtime::journal::Journal;
 use acm_sim::Scenario;
 use anyhow::{Context, bail};
@@ -24,10 +25,12 @@ pub(super) fn run(recorded: &Recorded, args: &TraceReplayArgs, after: u64) -> an
     if after == 0 || after >= last {
         bail!("there is nothing to fork after message {after}: the run has messages 1 to {last}");
     }
-    let (mut run, otherwise) = (recorded.arguments()?, &args.otherwise);
-    run.inject.extend(otherwise.inject.iter().cloned());
+    let donor = recorded.donor()?;
+    let (mut run, otherwise) = (recorded.arguments(donor.as_ref().map(tempfile::TempDir::path))?, &args.otherwise);
+    // What happens in the world happens at a moment of its own; a moment before the fork is no fork, and is told.
+    let (cameras, others): (Vec<_>, Vec<_>) = otherwise.inject.iter().cloned().partition(Injection::is_of_cameras);
+    run.inject.extend(others);
     run.set.extend(otherwise.set.iter().cloned());
-    run.on_unknown = otherwise.on_unknown.unwrap_or(run.on_unknown);
     let name = run.scenario.as_deref().context("the run was on a robot in another process: it has no simulator")?;
     let scenario = Scenario::open_with(name, &run.set)?;
     // Up to the fork the model replies as it did; what the last recorded message asks is asked of the other one.
@@ -41,12 +44,16 @@ pub(super) fn run(recorded: &Recorded, args: &TraceReplayArgs, after: u64) -> an
         None => config.llm.clone(),
     };
     let memory = recorded.memory()?;
+    let settings = recorded.settings()?.unwrap_or(config.settings);
+    let mut then = otherwise.config.as_deref().map(config::read).transpose()?.unwrap_or_else(|| settings.clone());
+    then.on_unknown = otherwise.on_unknown.map_or(then.on_unknown, Into::into);
     let begins = Signal::default();
     let config = EpisodeConfig {
         memory: memory.as_ref().map(|folder| folder.path().to_path_buf()),
         llm,
         trace: otherwise.trace.clone().map(|path| TraceRequest { path, frames: FrameDetail::default() }),
-        faults: Faults { cameras_from: begins_at_fork(&run.inject, otherwise.inject.len(), &begins), ..config.faults },
+        settings,
+        fork: Some(Fork { begins: begins.clone(), cameras: Faults::new(&cameras), settings: then }),
         ..config
     };
     let comparison = Arc::new(Comparison {
@@ -69,10 +76,4 @@ pub(super) fn run(recorded: &Recorded, args: &TraceReplayArgs, after: u64) -> an
     println!("as recorded up to message {after}, then live");
     print_judgement(&result)?;
     Ok(exit_of(&result))
-}
-
-/// Camera faults that are new begin at the fork; those that the recorded run had begin where they did.
-fn begins_at_fork(all: &[crate::inject::Injection], new: usize, begins: &Signal) -> Option<Signal> {
-    let before = Faults::new(all.get(..all.len() - new).unwrap_or_default());
-    (!before.black_frames && !before.freeze_frames && before.misplaced.is_none()).then(|| begins.clone())
 }

@@ -50,13 +50,9 @@ impl Log {
             .truncate(false)
             .open(&path)
             .map_err(|source| io_error(&path, source))?;
-        let size = file.metadata().map_err(|source| io_error(&path, source))?.len();
-        if size > MAX_LOG_BYTES {
-            return Err(record_error(&path, 0, format!("{size} bytes, at most {MAX_LOG_BYTES} are read")));
-        }
-        let bytes = fs::read(&path).map_err(|source| io_error(&path, source))?;
+        let bytes = read_log(&path)?;
         let Scan { events, good, batches } = scan(&path, &bytes)?;
-        if good < size {
+        if good < bytes.len() as u64 {
             file.set_len(good).and_then(|()| file.sync_data()).map_err(|source| io_error(&path, source))?;
         }
         file.seek(SeekFrom::Start(good)).map_err(|source| io_error(&path, source))?;
@@ -123,6 +119,28 @@ impl Log {
         self.torn = false;
         Ok(())
     }
+}
+
+/// The events of a memory folder, which is left as it is.
+///
+/// # Errors
+/// There is no memory in the folder, another process writes it, or it is damaged.
+pub fn read_events(dir: &Path) -> Result<Vec<Event>, MemoryError> {
+    let path = dir.join("events.log");
+    if !path.is_file() {
+        return Err(MemoryError::Missing { path: dir.into() });
+    }
+    check_format(dir)?;
+    let _lock = lock(dir)?;
+    Ok(scan(&path, &read_log(&path)?)?.events)
+}
+
+fn read_log(path: &Path) -> Result<Vec<u8>, MemoryError> {
+    let size = fs::metadata(path).map_err(|source| io_error(path, source))?.len();
+    if size > MAX_LOG_BYTES {
+        return Err(record_error(path, 0, format!("{size} bytes, at most {MAX_LOG_BYTES} are read")));
+    }
+    fs::read(path).map_err(|source| io_error(path, source))
 }
 
 struct Scan {

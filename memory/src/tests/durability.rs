@@ -220,6 +220,30 @@ fn a_second_writer_is_refused_until_the_first_is_gone() {
 }
 
 #[test]
+fn a_transplanted_memory_believes_what_its_donor_believed() {
+    let dir = tempfile::tempdir().unwrap();
+    let (donor, own) = (dir.path().join("donor"), dir.path().join("own"));
+    let mut memory = open(&donor).unwrap();
+    begin(&mut memory).unwrap();
+    look(&mut memory, 0, 0.0, &[Thing::can(0.03, 0.1)], &[], &open_hand(0.0)).unwrap();
+    assert!(matches!(crate::read_events(&donor), Err(MemoryError::Locked { .. })));
+    let believed = memory.state().clone();
+    drop(memory);
+    let events = crate::read_events(&donor).unwrap();
+
+    let mut memory = open(&own).unwrap();
+    begin(&mut memory).unwrap();
+    look(&mut memory, 0, 0.0, &[Thing::block([0.05, 0.04, 0.03])], &[], &open_hand(0.0)).unwrap();
+    assert!(contains(&own, b"\"block\""));
+    memory.transplant(&events).unwrap();
+    assert_eq!(memory.state(), &believed);
+    drop(memory);
+    assert_eq!(open(&own).unwrap().state(), &believed);
+    assert!(contains(&own, b"cylinder") && !contains(&own, b"\"block\""));
+    assert!(matches!(crate::read_events(&dir.path().join("nothing")), Err(MemoryError::Missing { .. })));
+}
+
+#[test]
 fn what_was_wiped_is_in_no_file() {
     let dir = tempfile::tempdir().unwrap();
     let mut memory = open(dir.path()).unwrap();
