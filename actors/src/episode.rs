@@ -392,6 +392,24 @@ impl Core<Message> for Episode {
         }
         self.dispatch(message.body, outbox)
     }
+
+    fn state(&self) -> Option<String> {
+        let pending = self
+            .pending
+            .as_ref()
+            .map(|pending| serde_json::json!({ "transition": pending.transition, "looks": pending.looks }));
+        let state = serde_json::json!({
+            "waits_for": format!("{:?}", self.doing).to_lowercase(),
+            "looks": self.looks,
+            "frames_perceived": self.report.frames_perceived,
+            "steps": self.report.steps.len(),
+            "step": self.step.as_ref().map(|(step, _)| step.to_string()),
+            "to_be_verified": pending,
+            "subtasks": self.task.as_ref().map(|task| task.subtasks.len()),
+            "restarts": self.report.restarts,
+        });
+        Some(state.to_string())
+    }
 }
 
 #[cfg(test)]

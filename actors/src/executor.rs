@@ -122,6 +122,15 @@ impl Core<Message> for ExecutorActor {
         outbox.send(HOST, Message::Sense);
         Ok(())
     }
+
+    fn state(&self) -> Option<String> {
+        let job = self.work.as_ref().map(|work| match &work.job {
+            Job::Skill(invocation) => format!("{} {}", invocation.skill, invocation.part),
+            Job::Retreat => "retreat".to_owned(),
+        });
+        let ticks = self.work.as_ref().map(|work| work.ticks);
+        Some(serde_json::json!({ "runs": job, "ticks": ticks }).to_string())
+    }
 }
 
 /// The message that ends a job which its controller could not end.

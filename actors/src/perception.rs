@@ -58,4 +58,9 @@ impl Core<Message> for PerceptionActor {
         }
         Ok(())
     }
+
+    fn state(&self) -> Option<String> {
+        let expected = self.expectation.as_ref().map(|expected| expected.objects.len());
+        Some(serde_json::json!({ "expected_objects": expected }).to_string())
+    }
 }

@@ -150,4 +150,14 @@ impl Core<Message> for PlannerActor {
         outbox.send(EPISODE, answer);
         Ok(())
     }
+
+    fn state(&self) -> Option<String> {
+        // Without a model it keeps nothing.
+        self.hybrid.then_some(())?;
+        let asked = self.asked.as_ref().map(|asked| {
+            let (calls, faults) = (asked.dialogue.calls(), asked.dialogue.faults());
+            serde_json::json!({ "instruction": asked.instruction, "calls": calls, "faults": faults })
+        });
+        Some(serde_json::json!({ "asks_the_model": asked }).to_string())
+    }
 }

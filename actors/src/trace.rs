@@ -26,7 +26,7 @@ use acm_runtime::{
     journal::{Handled, Journal, JournalError},
     trace::{Channel, TraceError, TraceJournal, TraceWriter, journal::json_schema},
 };
-use delta::Deltas;
+use delta::{Deltas, Keyframe};
 pub use frames::FrameDetail;
 use serde::Serialize;
 use std::{
@@ -60,6 +60,7 @@ pub struct Trace {
     draws: Channel,
     frames: Channel,
     changes: Channel,
+    keyframes: Channel,
     /// The last message that was written: with one request in flight, the one that is being handled.
     seq: AtomicU64,
     time_ns: AtomicU64,
@@ -74,6 +75,8 @@ impl Trace {
         let effect = |topic: &str| writer.channel(topic, &json_schema("acm.Effect", EFFECT_SCHEMA));
         let (frames, draws) = (effect("/effect/frame")?, effect("/effect/draw")?);
         let changes = writer.channel("/memory/delta", &json_schema("acm.MemoryDelta", delta::SCHEMA))?;
+        let keyframes =
+            writer.channel("/memory/keyframe", &json_schema("acm.MemoryKeyframe", delta::KEYFRAME_SCHEMA))?;
         Ok(Trace {
             journal: TraceJournal::new(Arc::clone(&writer)),
             viewer: Viewer::new(&writer)?,
@@ -82,6 +85,7 @@ impl Trace {
             draws,
             frames,
             changes,
+            keyframes,
             seq: AtomicU64::new(0),
             time_ns: AtomicU64::new(0),
             deltas: Mutex::default(),
@@ -112,13 +116,21 @@ impl Trace {
     pub fn begin(&self, task: &TaskSpec, robot: &RobotDescription, memory: &dyn Memory) -> Result<(), JournalError> {
         self.writer.attach("task.json", "application/json", &json(task)?)?;
         self.writer.attach("robot.json", "application/json", &json(robot)?)?;
-        self.deltas.lock().unwrap_or_else(PoisonError::into_inner).begin(memory);
+        let mut deltas = self.deltas.lock().unwrap_or_else(PoisonError::into_inner);
+        deltas.begin(memory);
+        self.keyframe(deltas.keyframe(0, memory))?;
         Ok(self.writer.flush()?)
     }
 
     /// A camera whose frames are written down on their way to the agent.
     pub fn cameras(self: &Arc<Self>, cameras: Box<dyn CameraSource>) -> Box<dyn CameraSource> {
         Box::new(frames::TracedCamera::new(cameras, Arc::clone(self)))
+    }
+
+    /// Writes down all that memory believes, so that nobody has to add up its changes from the beginning.
+    fn keyframe(&self, keyframe: Keyframe) -> Result<(), JournalError> {
+        let (seq, time_ns) = (self.seq.load(Ordering::Relaxed), self.time_ns.load(Ordering::Relaxed));
+        Ok(self.writer.put(self.keyframes, seq, time_ns, &json(&keyframe)?)?)
     }
 
     /// Guesses are random draws: what was drawn goes beside the decision that rests on it.
@@ -145,6 +157,9 @@ impl Journal<Message> for Trace {
             self.journal.record(message)
         })
     }
+    fn keeps_states(&self) -> bool {
+        Journal::<Message>::keeps_states(&self.journal)
+    }
     fn handled(&self, handled: &Handled) -> Result<(), JournalError> {
         self.counted(|| Journal::<Message>::handled(&self.journal, handled))
     }
@@ -154,11 +169,14 @@ impl MemoryObserver for Trace {
     fn changed(&self, memory: &dyn Memory) -> Result<(), JournalError> {
         self.counted(|| {
             let (seq, time_ns) = (self.seq.load(Ordering::Relaxed), self.time_ns.load(Ordering::Relaxed));
-            let deltas = self.deltas.lock().unwrap_or_else(PoisonError::into_inner).take(seq, memory);
-            for delta in deltas {
+            let mut deltas = self.deltas.lock().unwrap_or_else(PoisonError::into_inner);
+            for delta in deltas.take(seq, memory) {
                 self.writer.put(self.changes, seq, time_ns, &json(&delta)?)?;
             }
-            Ok(())
+            match deltas.keyframe_is_due() {
+                true => self.keyframe(deltas.keyframe(seq, memory)),
+                false => Ok(()),
+            }
         })
     }
 }

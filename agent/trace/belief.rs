@@ -2,7 +2,7 @@
 
 use super::{
     decision,
-    run_file::{Delta, RunFile},
+    run_file::{Delta, Keyframe, RunFile},
 };
 use acm_concept::{
     ids::{FrameId, ObjectId, TransitionId},
@@ -15,6 +15,7 @@ use std::collections::BTreeMap;
 #[derive(Debug, Default)]
 pub struct Beliefs<'a> {
     of: BTreeMap<ObjectId, Vec<Change<'a>>>,
+    keyframes: &'a [Keyframe],
 }
 
 /// A change of what is believed of an object.
@@ -49,7 +50,7 @@ impl<'a> Beliefs<'a> {
             };
             of.entry(object).or_default().push(Change { delta, words });
         }
-        Beliefs { of }
+        Beliefs { of, keyframes: &run.keyframes }
     }
 
     /// All changes, object by object.
@@ -66,7 +67,14 @@ impl<'a> Beliefs<'a> {
     /// What was believed of an object just before a message; none where the trace does not say.
     pub fn at(&self, object: ObjectId, seq: u64) -> Option<&'a Value> {
         let changes = self.before(object, seq);
-        changes.iter().rev().find(|change| change.delta.change == "object").map(|change| &change.delta.after)
+        let changed = changes.iter().rev().find(|change| change.delta.change == "object");
+        changed.map(|change| &change.delta.after).or_else(|| self.framed(object, seq))
+    }
+
+    /// What the last keyframe before a message says of an object: it may have been known before the trace began.
+    fn framed(&self, object: ObjectId, seq: u64) -> Option<&'a Value> {
+        let before = self.keyframes.get(..self.keyframes.partition_point(|keyframe| keyframe.seq < seq))?;
+        before.last()?.objects.get(&object.to_string())
     }
 
     /// Whether memory knew an object before the trace began: then frames of an earlier run may stand behind it.

@@ -3,7 +3,7 @@
 use super::recording::{RESULT, RUN};
 use acm_actors::trace::viewer;
 use acm_concept::literal::Evidence;
-use acm_runtime::trace::{Item, Record, TraceReader, reader::TraceMessage, record};
+use acm_runtime::trace::{Item, Record, TraceReader, journal::ACTOR_STATE, reader::TraceMessage, record};
 use anyhow::Context;
 use serde::{Deserialize, Serialize};
 use std::{collections::BTreeMap, path::Path};
@@ -88,6 +88,28 @@ pub struct Effect {
     pub record: serde_json::Value,
 }
 
+/// What an actor keeps from a message on.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct ActorState {
+    /// The message.
+    pub seq: u64,
+    /// The actor.
+    pub actor: String,
+    /// What it keeps.
+    pub state: serde_json::Value,
+}
+
+/// All that memory believes after a message.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct Keyframe {
+    /// The message; 0 before the first.
+    pub seq: u64,
+    /// Number of the last event since memory was opened.
+    pub event: u64,
+    /// Each object by its id.
+    pub objects: BTreeMap<String, serde_json::Value>,
+}
+
 /// A trace as far as it could be read.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct RunFile {
@@ -101,6 +123,10 @@ pub struct RunFile {
     pub deltas: Vec<Delta>,
     /// What came from outside, in order.
     pub effects: Vec<Effect>,
+    /// What actors keep between messages, in order.
+    pub states: Vec<ActorState>,
+    /// What memory believes, in order.
+    pub keyframes: Vec<Keyframe>,
     /// Size of the file.
     pub bytes: u64,
     /// Messages on all channels.
@@ -145,6 +171,8 @@ impl RunFile {
             record::NAME => self.entries.extend(Entry::parse(message.data)),
             "acm.MemoryDelta" => self.deltas.extend(serde_json::from_slice::<Delta>(&message.data)),
             "acm.Effect" => self.effects.extend(effect(&message)),
+            ACTOR_STATE => self.states.extend(serde_json::from_slice::<ActorState>(&message.data)),
+            "acm.MemoryKeyframe" => self.keyframes.extend(serde_json::from_slice::<Keyframe>(&message.data)),
             "foxglove.Log" => lines.extend(viewer::read_line(&message.data)),
             _ => {}
         }
@@ -153,6 +181,12 @@ impl RunFile {
     /// A value of what is known of the run; `?` where it is not.
     pub fn about(&self, name: &str) -> &str {
         self.about.get(name).map_or("?", String::as_str)
+    }
+
+    /// What each actor that keeps something kept when a message came to be handled.
+    pub fn states_before(&self, seq: u64) -> BTreeMap<&str, &ActorState> {
+        let before = self.states.iter().filter(|state| state.seq < seq);
+        before.map(|state| (state.actor.as_str(), state)).collect()
     }
 
     /// The message of a number.

@@ -7,7 +7,7 @@ use super::{
 use crate::cli::{Exit, trace::TraceShowArgs};
 use anyhow::bail;
 use std::{
-    collections::BTreeSet,
+    collections::{BTreeMap, BTreeSet},
     io::{self, Write},
 };
 
@@ -162,8 +162,12 @@ fn one(run: &RunFile, seq: u64, json: bool, out: &mut impl Write) -> anyhow::Res
     let entry = run.asked(seq)?;
     let record = entry.record()?;
     let deltas: Vec<_> = run.deltas.iter().filter(|delta| delta.seq == seq).collect();
+    let states = run.states_before(seq);
     if json {
-        let all = serde_json::json!({ "schema": "acm.trace-message/1", "message": record, "memory": deltas });
+        let states: BTreeMap<_, _> = states.iter().map(|(actor, state)| (actor, &state.state)).collect();
+        let all = serde_json::json!({
+            "schema": "acm.trace-message/1", "message": record, "memory": deltas, "states_before": states
+        });
         serde_json::to_writer_pretty(&mut *out, &all).map_err(io::Error::from)?;
         writeln!(out)?;
         return Ok(());
@@ -180,6 +184,10 @@ fn one(run: &RunFile, seq: u64, json: bool, out: &mut impl Write) -> anyhow::Res
     writeln!(out, "{}", entry.line)?;
     for words in deltas.iter().filter_map(|delta| decision::delta_words(delta)) {
         writeln!(out, "memory: {words}")?;
+    }
+    for (actor, state) in states {
+        let told = if actor == record.to { "kept before" } else { "kept" };
+        writeln!(out, "{actor} {told}: {}", decision::shortened(&state.state))?;
     }
     if calls::tell(entry, out)? {
         return Ok(());

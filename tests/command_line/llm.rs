@@ -140,6 +140,10 @@ fn a_wrong_answer_is_repaired_and_another_model_goes_on_from_a_fork() {
     let asked = messages(&trace, "ask-llm");
     let turns = |at: usize| asked[at]["body"]["request"]["turns"].as_array().unwrap().len();
     assert_eq!((asked.len(), turns(0), turns(1), turns(2)), (3, 1, 3, 5));
+    // Between two calls the planner keeps the question under way, which a keyframe tells.
+    let second = messages(&trace, "llm-replied")[1]["seq"].to_string();
+    let shown = prints(&["trace", "show", text(&trace), "--seq", &second]);
+    assert!(shown.contains("planner kept before: ") && shown.contains("asks_the_model"), "{shown}");
     let reading = &messages(&trace, "parsed")[0]["body"]["reading"];
     assert_eq!((&reading["calls"], &reading["faults"][1]["kind"]), (&3.into(), &"ungrounded".into()));
     assert!(prints(&["trace", "replay", text(&trace)]).starts_with("identical: "));

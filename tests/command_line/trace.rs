@@ -66,6 +66,34 @@ fn a_trace_is_listed_and_shown_as_a_table() {
 }
 
 #[test]
+fn keyframes_are_what_the_changes_add_up_to() {
+    let run = acm::trace::run_file::RunFile::read(trace()).unwrap();
+    assert!(run.keyframes.len() >= 5, "{}", run.keyframes.len());
+    let (mut believed, mut deltas) = (std::collections::BTreeMap::new(), run.deltas.iter().peekable());
+    for keyframe in &run.keyframes {
+        while let Some(delta) = deltas.next_if(|delta| delta.event <= keyframe.event) {
+            if delta.change == "object" {
+                believed.insert(delta.object.clone().unwrap(), delta.after.clone());
+            }
+        }
+        assert_eq!(keyframe.objects, believed, "at message {}", keyframe.seq);
+    }
+    assert!(!believed.is_empty());
+}
+
+#[test]
+fn what_actors_kept_is_told_with_a_message() {
+    let file = trace().to_str().unwrap();
+    let run = acm::trace::run_file::RunFile::read(trace()).unwrap();
+    let moved = run.entries.iter().find(|entry| entry.header.kind == "moved").unwrap().header.seq;
+    let told = prints(&["trace", "show", file, "--seq", &moved.to_string()]);
+    assert!(told.contains("executor kept before: runs pick") && told.contains("waits_for executing"), "{told}");
+    let told: serde_json::Value =
+        serde_json::from_str(&prints(&["trace", "show", file, "--seq", &moved.to_string(), "--json"])).unwrap();
+    assert_eq!(told["states_before"]["episode"]["waits_for"], "executing");
+}
+
+#[test]
 fn a_step_tells_what_was_considered_predicted_and_found() {
     let step = prints(&["trace", "show", trace().to_str().unwrap(), "--step", "1"]);
     for part in

@@ -14,6 +14,11 @@ pub struct CoreError(pub String);
 pub trait Core<M>: Send {
     /// Handles one message; answers and requests go to the outbox and are sent after the call returns.
     fn handle(&mut self, message: Envelope<M>, outbox: &mut Outbox<M>) -> Result<(), CoreError>;
+    /// What it keeps between messages, as one JSON document, for the keyframes of a trace; `None` for a core that keeps
+    /// nothing. It is asked only where somebody writes it down.
+    fn state(&self) -> Option<String> {
+        None
+    }
 }
 
 /// Messages that a core wants sent.

@@ -23,12 +23,19 @@ pub struct Handled {
     pub time_ns: u64,
     /// Wall time that its handler took.
     pub took: Duration,
+    /// What the handler's actor keeps from then on, as JSON: where the journal keeps states, the actor has one, and the
+    /// message is none of a long series.
+    pub state: Option<String>,
 }
 
 /// Takes every delivered message before its handler runs, so that the last entry of a crashed run is the culprit.
 pub trait Journal<M>: Send + Sync {
     /// Writes one message down.
     fn record(&self, message: &Envelope<M>) -> Result<(), JournalError>;
+    /// Whether it wants to know what actors keep between messages.
+    fn keeps_states(&self) -> bool {
+        false
+    }
     /// Is told that a message was handled. Wall time differs between equal runs: whoever keeps it keeps it apart.
     fn handled(&self, _: &Handled) -> Result<(), JournalError> {
         Ok(())
@@ -42,6 +49,9 @@ impl<M: Send> Journal<M> for Both<M> {
     fn record(&self, message: &Envelope<M>) -> Result<(), JournalError> {
         self.0.record(message)?;
         self.1.record(message)
+    }
+    fn keeps_states(&self) -> bool {
+        self.0.keeps_states() || self.1.keeps_states()
     }
     fn handled(&self, handled: &Handled) -> Result<(), JournalError> {
         self.0.handled(handled)?;

@@ -31,6 +31,37 @@ pub(super) const SCHEMA: &str = r#"{
   }
 }"#;
 
+/// JSON Schema of the records on `/memory/keyframe`.
+pub(super) const KEYFRAME_SCHEMA: &str = r#"{
+  "$schema": "https://json-schema.org/draft/2020-12/schema",
+  "title": "acm.MemoryKeyframe",
+  "description": "All that memory believes at a moment: what the changes before add up to.",
+  "type": "object",
+  "required": ["seq", "event", "objects", "transitions", "skills", "progress"],
+  "properties": {
+    "seq": {"type": "integer", "description": "the message whose handling changed memory last; 0 before the first"},
+    "event": {"type": "integer", "description": "number of the last event since memory was opened; 0 before the first"},
+    "objects": {"type": "object", "description": "each object by its id, as on /memory/delta"},
+    "transitions": {"type": "integer", "description": "transitions that memory keeps"},
+    "skills": {"type": "integer", "description": "skill entries"},
+    "progress": {"type": "object", "description": "where the agent is in its instruction"}
+  }
+}"#;
+
+/// Most changes between two keyframes.
+const KEYFRAME_EVERY: u64 = 64;
+
+/// All that memory believes, as it is written down.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct Keyframe {
+    seq: u64,
+    event: u64,
+    objects: BTreeMap<ObjectId, Value>,
+    transitions: usize,
+    skills: usize,
+    progress: Value,
+}
+
 /// A change of memory as it is written down.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Delta {
@@ -49,6 +80,9 @@ pub(super) struct Delta {
 #[derive(Debug, Default)]
 pub(super) struct Deltas {
     known: u64,
+    /// Events up to the last keyframe, and whether one is due at once.
+    framed: u64,
+    turned: bool,
     objects: BTreeMap<ObjectId, Value>,
 }
 
@@ -68,12 +102,33 @@ impl Deltas {
         recent.events.into_iter().zip(first..).map(|(event, number)| self.delta(seq, number, event, &*view)).collect()
     }
 
+    /// Whether so much changed since the last keyframe that another one is due: many events, or one after which most is
+    /// otherwise than before.
+    pub(super) fn keyframe_is_due(&self) -> bool {
+        self.turned || self.known >= self.framed + KEYFRAME_EVERY
+    }
+
+    /// All that memory believes.
+    pub(super) fn keyframe(&mut self, seq: u64, memory: &dyn Memory) -> Keyframe {
+        (self.framed, self.turned) = (self.known, false);
+        let view = memory.view();
+        Keyframe {
+            seq,
+            event: self.known,
+            objects: view.objects().iter().map(|entry| (entry.id, short(entry))).collect(),
+            transitions: view.transitions().len(),
+            skills: view.skills().len(),
+            progress: json!(view.progress()),
+        }
+    }
+
     fn reread(&mut self, view: &dyn MemoryView) {
         self.objects = view.objects().iter().map(|entry| (entry.id, short(entry))).collect();
     }
 
     fn delta(&mut self, seq: u64, number: u64, event: Event, view: &dyn MemoryView) -> Delta {
         let (change, object, before, after) = self.change(&event.change, view);
+        self.turned |= matches!(change, "instructed" | "subtask-done" | "forgotten" | "wiped");
         let Event { moment, source, evidence, .. } = event;
         Delta { seq, event: number, moment, source, evidence, change, object, before, after }
     }

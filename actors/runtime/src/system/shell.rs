@@ -35,7 +35,7 @@ impl<M: Payload> Actor for Shell<M> {
     ) -> Result<(), ActorProcessingErr> {
         self.shared.journal.record(&message)?;
         self.panic_if_told();
-        let (seq, sent_ns) = (message.seq, message.time_ns);
+        let (seq, sent_ns, routine) = (message.seq, message.time_ns, message.body.routine());
         let mut outbox = Outbox::new(sent_ns);
         // The one place where handlers are timed: the figure goes to the report, never to a core.
         #[allow(clippy::disallowed_methods)]
@@ -44,7 +44,8 @@ impl<M: Payload> Actor for Shell<M> {
         let elapsed = started.elapsed();
         *self.shared.spent.lock().unwrap_or_else(PoisonError::into_inner).entry(self.role).or_default() += elapsed;
         outcome?;
-        self.shared.journal.handled(&Handled { seq, by: self.role, time_ns: sent_ns, took: elapsed })?;
+        let state = (!routine && self.shared.journal.keeps_states()).then(|| core.state()).flatten();
+        self.shared.journal.handled(&Handled { seq, by: self.role, time_ns: sent_ns, took: elapsed, state })?;
         let (time_ns, messages) = outbox.into_messages();
         for (to, body) in messages {
             self.shared.deliver(self.role, to, Some(seq), time_ns, body);

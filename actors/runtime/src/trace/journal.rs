@@ -33,19 +33,43 @@ const WALL_SCHEMA: &str = r#"{
   }
 }"#;
 
+/// Name of the schema of what an actor keeps.
+pub const ACTOR_STATE: &str = "acm.ActorState";
+
+const STATE_SCHEMA: &str = r#"{
+  "$schema": "https://json-schema.org/draft/2020-12/schema",
+  "title": "acm.ActorState",
+  "description": "What an actor keeps after a message, wherever that is not what it kept before.",
+  "type": "object",
+  "required": ["seq", "actor", "state"],
+  "properties": {
+    "seq": {"type": "integer", "minimum": 1, "description": "the message"},
+    "actor": {"type": "string", "description": "who handled it"},
+    "state": {"type": "object", "description": "what it keeps from then on"}
+  }
+}"#;
+
 /// Writes each message to the channel of its receiver and kind before it is handled, and afterwards how long that
 /// took. The last message of a crashed run stands without a time.
 pub struct TraceJournal {
     writer: Arc<TraceWriter>,
     channels: Mutex<BTreeMap<(Role, &'static str), Channel>>,
     wall: OnceLock<Channel>,
+    /// Channel and last state of each actor that has one.
+    states: Mutex<BTreeMap<Role, (Channel, String)>>,
     held: AtomicU32,
 }
 
 impl TraceJournal {
     /// A journal that writes to `writer`, which stays open for others.
     pub fn new(writer: Arc<TraceWriter>) -> TraceJournal {
-        TraceJournal { writer, channels: Mutex::default(), wall: OnceLock::new(), held: AtomicU32::new(0) }
+        TraceJournal {
+            writer,
+            channels: Mutex::default(),
+            wall: OnceLock::new(),
+            states: Mutex::default(),
+            held: AtomicU32::new(0),
+        }
     }
 
     fn channel(&self, to: Role, kind: &'static str) -> Result<Channel, TraceError> {
@@ -57,6 +81,21 @@ impl TraceJournal {
         let channel = self.writer.channel(&record::topic(to.0, kind), &schema)?;
         channels.insert((to, kind), channel);
         Ok(channel)
+    }
+
+    /// Writes a state down that is not the actor's last one.
+    fn state(&self, handled: &Handled, state: &str) -> Result<(), TraceError> {
+        let (seq, by) = (handled.seq, handled.by);
+        let mut states = self.states.lock().unwrap_or_else(PoisonError::into_inner);
+        let channel = match states.get(&by) {
+            Some((_, last)) if last == state => return Ok(()),
+            Some((channel, _)) => *channel,
+            None => self.writer.channel(&format!("/actor/{by}"), &json_schema(ACTOR_STATE, STATE_SCHEMA))?,
+        };
+        let text = format!(r#"{{"seq":{seq},"actor":"{by}","state":{state}}}"#);
+        self.writer.put(channel, seq, handled.time_ns, text.as_bytes())?;
+        states.insert(by, (channel, state.to_owned()));
+        Ok(())
     }
 
     fn wall(&self) -> Result<Channel, TraceError> {
@@ -80,7 +119,14 @@ impl<M: Payload> Journal<M> for TraceJournal {
         Ok(self.writer.flush()?)
     }
 
+    fn keeps_states(&self) -> bool {
+        true
+    }
+
     fn handled(&self, handled: &Handled) -> Result<(), JournalError> {
+        if let Some(state) = &handled.state {
+            self.state(handled, state)?;
+        }
         if !self.writer.options().wall {
             return Ok(());
         }
@@ -136,7 +182,7 @@ mod tests {
         let journal = TraceJournal::new(Arc::clone(&writer));
         for seq in 1..=200 {
             journal.record(&envelope(seq, "tick \"tock\"", routine)).unwrap();
-            let handled = Handled { seq, by: Role("b"), time_ns: seq * 10, took: Duration::from_nanos(7) };
+            let handled = Handled { seq, by: Role("b"), time_ns: seq * 10, took: Duration::from_nanos(7), state: None };
             Journal::<Word>::handled(&journal, &handled).unwrap();
         }
         if finish {

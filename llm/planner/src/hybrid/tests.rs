@@ -105,7 +105,8 @@ fn the_prompt_names_the_instruction_and_what_the_library_has() {
 
 #[test]
 fn what_is_not_there_is_named() {
-    let cases: [(&dyn Fn(&mut Value), &str); 14] = [
+    type Change<'a> = &'a dyn Fn(&mut Value);
+    let cases: [(Change<'_>, &str); 14] = [
         (&|a| a["things"][0]["noun"] = json!("walrus"), "no noun `walrus`"),
         (&|a| a["things"][0]["phrase"] = json!("the walrus"), "does not say \"the walrus\""),
         (&|a| a["things"][0]["occurrence"] = json!(9), "does not say \"the cube\" 9 times"),
