@@ -3,7 +3,7 @@
 //! The text is data in `prompts/`, with a version. The answer's schema keeps to what all providers take: an object in
 //! which everything is required, unions with null alone, no references. Nouns, functions and colours that the library
 //! and the lexicon have are put in as enumerations, so that a decoder which heeds the schema cannot name another thing.
-//! Whoever gets an answer checks it against the schema; [`ground`] checks the rest.
+//! Whoever gets an answer checks it against the schema; `ground` checks the rest.
 
 mod form;
 mod ground;
