@@ -2,7 +2,9 @@
 
 pub mod trace;
 
-use crate::{bench, bench::world::WorldPart, demo, doctor, inject::Injection, perceive, run, scenario, serve};
+use crate::{
+    bench, bench::world::WorldPart, demo, doctor, inject::Injection, llm::LlmId, perceive, run, scenario, serve,
+};
 use acm_actors::{
     AgentError,
     episode::Until,
@@ -158,6 +160,9 @@ pub struct RunArgs {
     /// What the agent goes by: a TOML file, such as `[perception]` with `min_confidence = 0.3`.
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
+    /// The language model that reads instructions: rules (none), scripted=FILE, replay=FILE (docs/llm.md).
+    #[arg(long, value_name = "ID", default_value_t)]
+    pub llm: LlmId,
     /// Give this instruction instead of the scenario's own.
     #[arg(long)]
     pub instruction: Option<String>,
@@ -213,6 +218,7 @@ impl RunArgs {
         option("method", Some(self.method.clone()));
         let on_unknown = self.on_unknown.and_then(|on_unknown| on_unknown.to_possible_value());
         option("on-unknown", on_unknown.map(|value| value.get_name().to_owned()));
+        option("llm", (self.llm != LlmId::Rules).then(|| self.llm.to_string()));
         option("instruction", self.instruction.clone());
         option("library", self.library.as_ref().map(path));
         self.inject.iter().for_each(|fault| option("inject", Some(fault.to_string())));

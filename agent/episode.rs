@@ -2,6 +2,7 @@
 
 use crate::{
     inject::{Faults, FrameTap},
+    llm::Llm,
     trace::recording::{Recording, Stage, TraceRequest},
 };
 use acm_actors::{
@@ -60,6 +61,8 @@ pub struct EpisodeConfig {
     pub trace: Option<TraceRequest>,
     /// For tests: the actor of this name panics at its nth message.
     pub panic_at: Option<(String, u64)>,
+    /// The language model that reads instructions; the rules do without one.
+    pub llm: Option<Llm>,
     /// The event at which the run ends.
     pub until: Option<Until>,
     /// The words that start such a run from the command line; empty where it was not started there. For the trace.
@@ -320,6 +323,7 @@ impl Runner {
             .wipe_at(config.faults.wipe_at.clone())
             .transplant_at(config.faults.transplant.as_ref().map(|(_, at)| at.clone()), donated.into())
             .until(config.until)
+            .llm(config.llm.as_ref().map(Llm::backend))
             .journal(journal)
             .trace(trace.clone())
             .panic_at(panic_at.and_then(|(name, message)| role(name).map(|role| PanicAt { role, message: *message })))
@@ -416,8 +420,8 @@ fn verdict_of(verdict: HostVerdict) -> OracleVerdict {
 
 /// The actor of this name.
 pub(crate) fn role(name: &str) -> Option<Role> {
-    use acm_actors::message::{EPISODE, EXECUTOR, HOST, MEMORY, PERCEPTION, PLANNER, VERIFIER};
-    let roles = [EPISODE, EXECUTOR, HOST, MEMORY, PERCEPTION, PLANNER, VERIFIER];
+    use acm_actors::message::{EPISODE, EXECUTOR, HOST, LLM, MEMORY, PERCEPTION, PLANNER, VERIFIER};
+    let roles = [EPISODE, EXECUTOR, HOST, LLM, MEMORY, PERCEPTION, PLANNER, VERIFIER];
     roles.into_iter().find(|known| known.0 == name)
 }
 

@@ -9,6 +9,7 @@
 //! | [`remote`] | `acm run --robot`: an episode on a robot in another process |
 //! | [`serve`] | `acm sim serve`: the simulator as such a robot |
 //! | [`inject`] | faults that can be put between the agent and its world |
+//! | [`llm`] | which language model reads instructions, if any |
 //! | [`narrate`] | the story of an episode, told from its messages |
 //! | [`live`] | how a run goes on, while it does |
 //! | [`demo`] | `acm demo`: the first minute |
@@ -30,6 +31,7 @@ pub mod embed;
 pub mod episode;
 pub mod inject;
 pub mod live;
+pub mod llm;
 pub mod narrate;
 pub mod perceive;
 pub mod remote;

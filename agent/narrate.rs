@@ -99,6 +99,7 @@ impl Told {
                 lines.push(format!("told      \"{instruction}\""));
                 lines
             }
+            Message::Parsed { reading: Some(reading), .. } => vec![format!("read      {reading}")],
             Message::Updated { view, blindness, .. } => {
                 let mut lines: Vec<String> = self.blindness(*blindness, at).into_iter().collect();
                 lines.extend(self.changes(&*view.0, at));

@@ -6,6 +6,7 @@ use crate::{
     episode::{EpisodeConfig, EpisodeResult, Runner},
     inject::Faults,
     live::Live,
+    llm::Llm,
     narrate::Narrator,
     remote,
     statistics::{median_and, wilson95},
@@ -51,6 +52,7 @@ pub(crate) fn prepare(args: &RunArgs) -> anyhow::Result<(EpisodeConfig, Template
         no_motion: args.no_motion,
         sensor: args.sensor.clone(),
         until: args.until,
+        llm: Llm::open(&args.llm)?,
         arguments: args.words(),
         ..EpisodeConfig::default()
     };
@@ -238,7 +240,7 @@ fn line(result: &EpisodeResult) -> String {
         None => "",
     };
     format!(
-        "seed {:>6}  {word:<24} {faithful:<13} {:>5.1} s simulated {:>5.1} s wall {:>3} frames {:>2} skills  {}{}",
+        "seed {:>6}  {word:<24} {faithful:<13} {:>5.1} s simulated {:>5.1} s wall {:>3} frames {:>2} skills  {}{}{}",
         result.seed,
         result.report.ended.seconds(),
         result.wall_s,
@@ -246,7 +248,14 @@ fn line(result: &EpisodeResult) -> String {
         result.report.steps.len(),
         ending_words(&result.report.ending),
         if result.solved { String::new() } else { format!(" | judge: {}", result.verdict.explanation) },
+        fallbacks(result),
     )
+}
+
+/// Where the rules had to read an instruction for the model.
+fn fallbacks(result: &EpisodeResult) -> String {
+    let told = result.report.readings.iter().filter(|reading| reading.fallback.is_some());
+    told.map(|reading| format!(" | {reading}")).collect()
 }
 
 pub(crate) fn print_judgement(result: &EpisodeResult) -> anyhow::Result<()> {

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | [`recording`] | the trace of a run while it is being written |
 //! | [`run_file`] | a trace read back: who ran what, and every message |
+//! | [`calls`] | what a language model was asked and replied |
 //! | [`list`] | `acm trace ls`: one line a run |
 //! | [`show`] | `acm trace show`: the messages as a table |
 //! | [`decision`] | one step: what was considered, decided, predicted and found |
@@ -21,6 +22,7 @@
 //! | [`view`] | `acm trace view`: the viewer on this machine |
 
 pub mod belief;
+pub mod calls;
 pub mod check;
 pub mod decision;
 pub mod diff;

@@ -11,6 +11,8 @@ mod demo;
 mod export;
 #[path = "command_line/live.rs"]
 mod live;
+#[path = "command_line/llm.rs"]
+mod llm;
 #[path = "command_line/long.rs"]
 mod long;
 #[path = "command_line/other_programs.rs"]

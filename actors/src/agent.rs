@@ -4,8 +4,9 @@ use crate::{
     episode::{Episode, FaultEvent, Until, Upheavals},
     executor::ExecutorActor,
     host::{HostPort, Outside},
+    llm::LlmPort,
     memory::{MemoryActor, MemoryObserver},
-    message::{EPISODE, EXECUTOR, HOST, MEMORY, Message, PERCEPTION, PLANNER, VERIFIER},
+    message::{EPISODE, EXECUTOR, HOST, LLM, MEMORY, Message, PERCEPTION, PLANNER, VERIFIER},
     perception::PerceptionActor,
     planner::PlannerActor,
     report::EpisodeReport,
@@ -19,6 +20,7 @@ use acm_concept::{
     task::TaskSpec,
     template::TemplateLibrary,
 };
+use acm_llm::Backend;
 use acm_memory::{Memory, event::Event};
 use acm_perception::Grounder;
 use acm_planner::{Lexicon, PlanOptions, Planner};
@@ -34,6 +36,7 @@ use std::{
     time::Duration,
 };
 use thiserror::Error;
+use tokio::sync::watch;
 
 /// Frames that stay on the bus.
 const BUS_FRAMES: usize = 8;
@@ -71,6 +74,7 @@ pub struct AgentBuilder {
     donated: Arc<[Event]>,
     until: Option<Until>,
     panic_at: Option<PanicAt>,
+    llm: Option<Arc<dyn Backend>>,
 }
 
 impl AgentBuilder {
@@ -124,6 +128,11 @@ impl AgentBuilder {
         self.panic_at = panic_at;
         self
     }
+    /// Lets a language model read instructions; the rules read them without one, and where it fails.
+    pub fn llm(mut self, llm: Option<Arc<dyn Backend>>) -> Self {
+        self.llm = llm;
+        self
+    }
     /// The agent.
     pub fn build(mut self) -> Result<Agent, AgentError> {
         let planner = self.lexicon.take().map_or_else(Planner::new, |lexicon| Ok(Planner::with_lexicon(lexicon)))?;
@@ -173,6 +182,7 @@ impl Agent {
             donated: Arc::default(),
             until: None,
             panic_at: None,
+            llm: None,
         }
     }
 
@@ -202,7 +212,8 @@ impl Agent {
         };
         let outside = Arc::new(Mutex::new(Outside { embodiment, cameras, clock }));
         let robot = Arc::clone(&outside);
-        let mut system = self.system(task, camera, outside).starts_at(began).start().await?;
+        let (end_calls, ending) = watch::channel(false);
+        let mut system = self.system(task, camera, outside, ending).starts_at(began).start().await?;
         system.send(EPISODE, Message::Begin);
         let result = tokio::select! {
             biased;
@@ -211,9 +222,11 @@ impl Agent {
                 // Not by message: the robot must stop even if its port has a queue or is ended before it comes to it.
                 tokio::task::block_in_place(|| robot.lock().unwrap_or_else(PoisonError::into_inner).embodiment.stop());
                 system.send(EPISODE, Message::Interrupt);
+                end_calls.send_replace(true);
                 system.result(WALL_LIMIT).await
             }
         };
+        end_calls.send_replace(true);
         let spent = system.stop().await;
         match result? {
             Message::Ended(report) => Ok(EpisodeRun { report: *report, spent }),
@@ -224,7 +237,13 @@ impl Agent {
         }
     }
 
-    fn system(&self, task: TaskSpec, camera: String, outside: Arc<Mutex<Outside>>) -> SystemBuilder<Message> {
+    fn system(
+        &self,
+        task: TaskSpec,
+        camera: String,
+        outside: Arc<Mutex<Outside>>,
+        ending: watch::Receiver<bool>,
+    ) -> SystemBuilder<Message> {
         let parts = &self.parts;
         let bus: Arc<dyn FrameBus<RgbdFrame>> = Arc::new(InProcessBus::new(BUS_FRAMES));
         let robot = outside.lock().unwrap_or_else(PoisonError::into_inner).embodiment.description().clone();
@@ -244,7 +263,8 @@ impl Agent {
             None => Arc::clone(&parts.journal),
         };
         let observer = parts.trace.clone().map(|trace| trace as Arc<dyn MemoryObserver>);
-        SystemBuilder::new(1, journal)
+        let (llm, hybrid) = (parts.llm.clone(), parts.llm.is_some());
+        let system = SystemBuilder::new(1, journal)
             .actor(EPISODE, Box::new(move || Box::new(Episode::new(task.clone(), upheavals.clone()).until(until))))
             .actor(
                 HOST,
@@ -265,7 +285,7 @@ impl Agent {
                 PLANNER,
                 Box::new(move || {
                     let (planner, library) = (Arc::clone(&planner), Arc::clone(&library));
-                    Box::new(PlannerActor::new(planner, library, plans.clone(), options.clone()))
+                    Box::new(PlannerActor::new(planner, library, plans.clone(), options.clone()).hybrid(hybrid))
                 }),
             )
             .actor(EXECUTOR, Box::new(move || Box::new(ExecutorActor::new(hands.clone()))))
@@ -278,6 +298,10 @@ impl Agent {
                     restarted: failure.restarted,
                 }),
             )
-            .panic_at(parts.panic_at)
+            .panic_at(parts.panic_at);
+        match llm {
+            Some(llm) => system.actor(LLM, Box::new(move || Box::new(LlmPort::new(Arc::clone(&llm), ending.clone())))),
+            None => system,
+        }
     }
 }

@@ -74,6 +74,7 @@ impl Episode {
                 frames_perceived: 0,
                 ended: Time::ZERO,
                 restarts: 0,
+                readings: Vec::new(),
             },
         }
     }
@@ -93,7 +94,10 @@ impl Episode {
             Message::Waited => self.look("time has passed", out),
             Message::Retreated { failure } => self.retreated(failure, out),
             Message::Updated { feedback, view, grounding, .. } => self.updated(feedback, view, &grounding, out),
-            Message::Parsed(task) => self.parsed(task, out),
+            Message::Parsed { task, reading } => {
+                self.report.readings.extend(reading.map(|reading| *reading));
+                self.parsed(task, out);
+            }
             Message::Decided { decision, invocation } => self.decided(*decision, invocation, out)?,
             Message::SkillEnded(report) => self.skill_ended(report, out),
             Message::Kept { transition, view } => self.kept(transition, view, out),

@@ -11,7 +11,8 @@
 //! ```
 //!
 //! One request is in flight at a time, so the order of messages is total and a run can be repeated. The actors
-//! are pure cores (see [`acm_runtime::core`]); only the [`host`] port touches a camera, a clock or a robot.
+//! are pure cores (see [`acm_runtime::core`]); only the [`host`] port touches a camera, a clock or a robot, and only the
+//! [`llm`] port asks a model.
 //!
 //! | module | holds |
 //! |---|---|
@@ -24,12 +25,14 @@
 //! | [`episode`] | the closed loop (the paper's Algorithm 1) |
 //! | [`perception`], [`memory`], [`planner`], [`executor`], [`verifier`] | the five actors |
 //! | [`host`] | the port to the outside world |
+//! | [`llm`] | the port to a language model, where one is used |
 //! | [`remote`] | an outside world in another process |
 
 pub mod agent;
 pub mod episode;
 pub mod executor;
 pub mod host;
+pub mod llm;
 pub mod memory;
 pub mod message;
 pub mod perception;

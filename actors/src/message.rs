@@ -1,6 +1,6 @@
 //! Every message between the actors.
 
-use crate::report::EpisodeReport;
+use crate::report::{EpisodeReport, Reading};
 use acm_concept::{
     camera::FrameHeader,
     embodiment::{Command, Feedback},
@@ -10,6 +10,7 @@ use acm_concept::{
     object::Percepts,
     skill::{SkillInvocation, SkillReport},
 };
+use acm_llm::{Answer, ChatRequest};
 use acm_memory::{
     MemoryView,
     observation::{Executed, Grounding, Note, Verdict},
@@ -33,6 +34,8 @@ pub const EXECUTOR: Role = Role("executor");
 pub const VERIFIER: Role = Role("verifier");
 /// The port to camera, clock and robot.
 pub const HOST: Role = Role("host");
+/// The port to a language model; only there where one is used.
+pub const LLM: Role = Role("llm");
 
 /// A memory view in a message. Written down as what a reader of the trace needs of it: objects with their places.
 #[derive(Clone)]
@@ -154,8 +157,22 @@ pub enum Message {
         /// The instruction.
         instruction: String,
     },
+    /// planner -> llm: ask the model.
+    AskLlm {
+        /// What.
+        request: Box<ChatRequest>,
+    },
+    /// llm -> planner: what the model replied, or why it did not.
+    LlmReplied(Box<Answer>),
     /// planner -> episode: the task, or why it cannot be read.
-    Parsed(Result<Arc<Task>, String>),
+    Parsed {
+        /// Either.
+        #[serde(flatten)]
+        task: Result<Arc<Task>, String>,
+        /// What a language model had to do with it, where one was asked.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        reading: Option<Box<Reading>>,
+    },
     /// episode -> planner: what next?
     Decide {
         /// The task.
@@ -261,7 +278,9 @@ impl Payload for Message {
             Message::Settle { .. } => "settle",
             Message::Kept { .. } => "kept",
             Message::Parse { .. } => "parse",
-            Message::Parsed(_) => "parsed",
+            Message::AskLlm { .. } => "ask-llm",
+            Message::LlmReplied(_) => "llm-replied",
+            Message::Parsed { .. } => "parsed",
             Message::Decide { .. } => "decide",
             Message::Decided { .. } => "decided",
             Message::Execute(_) => "execute",

@@ -2,6 +2,7 @@
 
 use crate::episode::Until;
 use acm_concept::{ids::ObjectId, skill::FailureCause, time::Time};
+use acm_llm::{Fault, Usage};
 use acm_memory::observation::Outcome;
 use acm_planner::GiveUpCause;
 use serde::Serialize;
@@ -79,6 +80,33 @@ pub struct StepRecord {
     pub candidates_inspected: u32,
 }
 
+/// What a language model had to do with how an instruction was read.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Reading {
+    /// How often it was asked.
+    pub calls: u32,
+    /// The kind of backend that answered last, and its model; `None` where none answered.
+    pub answered_by: Option<(String, String)>,
+    /// What all replies cost.
+    pub usage: Usage,
+    /// What was wrong with the replies that were asked for again, and with the last one if it stayed so.
+    pub faults: Vec<Fault>,
+    /// Why the rules have read the instruction instead; `None` where the model has.
+    pub fallback: Option<String>,
+}
+
+impl fmt::Display for Reading {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (backend, model) = self.answered_by.as_ref().map_or(("", ""), |(backend, model)| (backend, model));
+        match &self.fallback {
+            None => write!(f, "read by the model {model} ({backend})")?,
+            Some(reason) => write!(f, "READ BY RULES INSTEAD OF THE MODEL: {reason}")?,
+        }
+        let calls = if self.calls == 1 { "call" } else { "calls" };
+        write!(f, "; {} {calls}, {}", self.calls, self.usage)
+    }
+}
+
 /// An episode from the agent's side.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EpisodeReport {
@@ -98,6 +126,9 @@ pub struct EpisodeReport {
     pub ended: Time,
     /// Actors that failed and were restarted.
     pub restarts: u32,
+    /// How a language model read each instruction; empty where none was used.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub readings: Vec<Reading>,
 }
 
 impl EpisodeReport {

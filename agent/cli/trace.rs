@@ -1,7 +1,7 @@
 //! The verbs of `acm trace` and their arguments.
 
 use super::OnUnknownArg;
-use crate::inject::Injection;
+use crate::{inject::Injection, llm::LlmId};
 use acm_concept::ids::FrameId;
 use acm_sim::Setting;
 use clap::{Args, Subcommand};
@@ -91,6 +91,9 @@ pub struct Otherwise {
     /// What to do from the fork on when memory cannot decide.
     #[arg(long, value_enum)]
     pub on_unknown: Option<OnUnknownArg>,
+    /// Another language model for what is asked after the fork, as `acm run --llm`; the run's own if absent.
+    #[arg(long, value_name = "ID")]
+    pub llm: Option<LlmId>,
     /// A field of the scenario, as `acm run --set`.
     #[arg(long, value_name = "PATH=VALUE")]
     pub set: Vec<Setting>,
@@ -178,6 +181,9 @@ pub struct TraceExportArgs {
     /// Trace events for Perfetto or chrome://tracing.
     #[arg(long, value_name = "FILE")]
     pub chrome: Option<PathBuf>,
+    /// What a language model was asked and replied, as a cassette for `acm run --llm replay=FILE`.
+    #[arg(long, value_name = "FILE")]
+    pub cassette: Option<PathBuf>,
     /// Spans of OpenTelemetry, sent to the collector at this http:// address, or written to this file as OTLP/JSON.
     #[arg(long, value_name = "URL|FILE")]
     pub otlp: Option<String>,

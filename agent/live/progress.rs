@@ -48,7 +48,7 @@ impl Progress {
         match message {
             Message::Frame { .. } => self.frames += 1,
             Message::Updated { view, .. } | Message::Kept { view, .. } => self.objects = view.0.objects().len(),
-            Message::Parsed(Ok(task)) => {
+            Message::Parsed { task: Ok(task), .. } => {
                 self.subtasks = task.subtasks.iter().map(|subtask| subtask.text.clone()).collect();
                 (self.subtask, self.step) = (0, None);
             }

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | [`lines`] | JSON, one record a line |
 //! | [`chrome`] | trace events of Chrome, which Perfetto reads |
+//! | [`super::calls`] | the calls of a language model as a cassette |
 //! | [`points`] | point clouds in the world, as PLY |
 //! | [`otlp`] | spans of OpenTelemetry, in a file or sent to a collector |
 //! | [`super::page`] | the viewer as one HTML file |
@@ -13,7 +14,7 @@ pub mod lines;
 pub mod otlp;
 pub mod points;
 
-use super::{page, run_file::RunFile};
+use super::{calls, page, run_file::RunFile};
 use crate::cli::{Exit, trace::TraceExportArgs};
 use anyhow::{Context, bail};
 use std::{
@@ -24,9 +25,11 @@ use std::{
 
 /// Runs `acm trace export`.
 pub fn run(args: &TraceExportArgs) -> anyhow::Result<Exit> {
-    let TraceExportArgs { file, html, jsonl, chrome, points, frame, otlp } = args;
-    if [html, jsonl, chrome, points].iter().all(|form| form.is_none()) && otlp.is_none() {
-        bail!("say in which form: --html FILE, --jsonl FILE, --chrome FILE, --points FOLDER or --otlp URL");
+    let TraceExportArgs { file, html, jsonl, chrome, cassette, points, frame, otlp } = args;
+    if [html, jsonl, chrome, cassette, points].iter().all(|form| form.is_none()) && otlp.is_none() {
+        bail!(
+            "say in which form: --html FILE, --jsonl FILE, --chrome FILE, --cassette FILE, --points FOLDER or --otlp URL"
+        );
     }
     let mut cut = None;
     if let Some(path) = html {
@@ -46,6 +49,16 @@ pub fn run(args: &TraceExportArgs) -> anyhow::Result<Exit> {
         cut.clone_from(&run.cut);
         let took = chrome::wall(file)?;
         write_to(path, |out| chrome::write(&run, &took, out))?;
+    }
+    if let Some(path) = cassette {
+        let run = RunFile::read(file)?;
+        cut.clone_from(&run.cut);
+        let cassette = calls::cassette(&run.entries, &path.display().to_string())?;
+        if cassette.is_empty() {
+            bail!("{}: no language model was asked in this run", file.display());
+        }
+        let text = cassette.text()?;
+        write_to(path, |out| Ok(out.write_all(text.as_bytes())?))?;
     }
     if let Some(folder) = points {
         let written = points::write(file, folder, *frame)?;

@@ -12,6 +12,7 @@
 pub mod plan;
 
 use super::{
+    calls::{self, CallRow},
     decision, picture,
     run_file::{Entry, RunFile},
     show,
@@ -65,7 +66,7 @@ pub struct Page {
     steps: Vec<Step>,
     frames: Vec<FrameRow>,
     changes: Vec<ChangeRow>,
-    calls: Vec<Value>,
+    calls: Vec<CallRow>,
 }
 
 /// A message, or many that take turns.
@@ -128,12 +129,7 @@ impl Page {
             steps: plan::steps(&run, &inquiry)?,
             frames: frames.into_values().collect(),
             changes: changes(&run, &inquiry),
-            calls: run
-                .effects
-                .iter()
-                .filter(|effect| effect.kind == "llm")
-                .map(|effect| effect.record.clone())
-                .collect(),
+            calls: calls::calls(&run.entries)?.into_iter().map(CallRow::from).collect(),
             ending: run.ending(),
             left_out,
             run: run.about,

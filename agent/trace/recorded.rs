@@ -1,12 +1,13 @@
 //! A trace read for being run again.
 
 use super::{
+    calls,
     picture::{self, Picture},
     recording::{DONOR_FOLDER, MEMORY_FOLDER},
     replay::run_arguments,
     run_file::{Entry, Header, RunFile},
 };
-use crate::{cli::RunArgs, inject::Injection};
+use crate::{cli::RunArgs, inject::Injection, llm::LlmId};
 use acm_actors::{
     host::Outside,
     message::HOST,
@@ -14,10 +15,11 @@ use acm_actors::{
     settings::Settings,
 };
 use acm_concept::{embodiment::RobotDescription, ids::FrameId, task::TaskSpec, time::Time};
+use acm_llm::Cassette;
 use acm_runtime::trace::{Item, TraceReader};
 use anyhow::{Context, bail};
 use serde::{Deserialize, de::DeserializeOwned};
-use std::{collections::BTreeMap, path::Path};
+use std::{collections::BTreeMap, path::Path, sync::Arc};
 
 /// Most bytes of frames that are held.
 const MAX_PIXEL_BYTES: usize = 8 << 30;
@@ -120,6 +122,17 @@ impl Recorded {
     /// It is malformed.
     pub fn settings(&self) -> anyhow::Result<Option<Settings>> {
         Ok(self.file::<Options>("options.json")?.settings)
+    }
+
+    /// The model that replies as it did in a run with `id`; `None` where the rules read the instructions.
+    ///
+    /// # Errors
+    /// A call has another form.
+    pub fn llm(&self, id: LlmId) -> anyhow::Result<Option<Arc<Cassette>>> {
+        if id == LlmId::Rules {
+            return Ok(None);
+        }
+        Ok(Some(Arc::new(calls::cassette(&self.entries, "the trace")?)))
     }
 
     /// A folder with the memory that the run began with; `None` where it began with an empty one.

@@ -14,6 +14,7 @@ use crate::{
     cli::{Exit, RunArgs, trace::TraceReplayArgs},
     episode::{EpisodeConfig, Runner},
     inject::Faults,
+    llm::Llm,
     run::prepare,
 };
 use acm_actors::{message::Message, settings::Signal, trace::words};
@@ -116,8 +117,11 @@ fn tell(divergence: &Divergence, out: &mut impl Write) -> io::Result<()> {
 /// The trace does not hold what the replay needs.
 pub fn replay(recorded: &Recorded, args: &TraceReplayArgs) -> anyhow::Result<Outcome> {
     let donor = recorded.donor()?;
-    let run = recorded.arguments(donor.as_ref().map(tempfile::TempDir::path))?;
+    let mut run = recorded.arguments(donor.as_ref().map(tempfile::TempDir::path))?;
+    // What a model replied is in the trace: its files need not be there.
+    let llm = recorded.llm(std::mem::take(&mut run.llm))?.map(Llm::Cassette);
     let (config, library) = prepare(&run)?;
+    let config = EpisodeConfig { llm, ..config };
     let comparison = Arc::new(Comparison::new(recorded, args));
     let journal = Arc::clone(&comparison) as Arc<dyn Journal<Message>>;
     let seed = recorded.seed()?;
@@ -159,6 +163,8 @@ struct Comparison {
     step: bool,
     /// After which message the run may be another one, and who is told.
     fork: Option<(u64, Signal)>,
+    /// From which message on another model answers, and who is told.
+    other_llm: Option<(u64, Signal)>,
     state: Mutex<State>,
 }
 
@@ -183,6 +189,7 @@ impl Comparison {
             until: args.until,
             step: args.step,
             fork: None,
+            other_llm: None,
             state: Mutex::default(),
         }
     }
@@ -194,6 +201,11 @@ impl Comparison {
         }
         let seq = message.seq;
         let expected = self.expected.get(&seq);
+        if let Some((from, signal)) = &self.other_llm
+            && seq >= *from
+        {
+            signal.give();
+        }
         if let Some((after, signal)) = &self.fork
             && seq > *after
         {

@@ -1,7 +1,7 @@
 //! `acm trace show`: the messages of a run.
 
 use super::{
-    decision,
+    calls, decision,
     run_file::{Entry, RunFile},
 };
 use crate::cli::{Exit, trace::TraceShowArgs};
@@ -188,6 +188,9 @@ fn one(run: &RunFile, seq: u64, json: bool, out: &mut impl Write) -> anyhow::Res
     for (actor, state) in states {
         let told = if actor == record.to { "kept before" } else { "kept" };
         writeln!(out, "{actor} {told}: {}", decision::shortened(&state.state))?;
+    }
+    if calls::tell(entry, out)? {
+        return Ok(());
     }
     serde_json::to_writer_pretty(&mut *out, &record.body).map_err(io::Error::from)?;
     writeln!(out)?;

@@ -6,8 +6,9 @@ use cargo_metadata::{DependencyKind, Metadata};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Each of our crates with those of ours that it may name. A crate that is missing here may not exist.
-const MAY_NAME: [(&str, &[&str]); 11] = [
+const MAY_NAME: [(&str, &[&str]); 12] = [
     ("acm-concept", &[]),
+    ("acm-llm", &[]),
     ("acm-runtime", &[]),
     ("acm-memory", &["acm-concept"]),
     ("acm-perception", &["acm-concept"]),
@@ -16,13 +17,17 @@ const MAY_NAME: [(&str, &[&str]); 11] = [
     ("acm-baselines", &["acm-concept", "acm-memory"]),
     ("acm-planner", &["acm-concept", "acm-memory"]),
     ("acm-sim", &["acm-concept", "acm-render"]),
-    ("acm-actors", &["acm-concept", "acm-memory", "acm-perception", "acm-planner", "acm-runtime", "acm-skills"]),
+    (
+        "acm-actors",
+        &["acm-concept", "acm-llm", "acm-memory", "acm-perception", "acm-planner", "acm-runtime", "acm-skills"],
+    ),
     (
         "acm",
         &[
             "acm-actors",
             "acm-baselines",
             "acm-concept",
+            "acm-llm",
             "acm-memory",
             "acm-perception",
             "acm-planner",
@@ -38,10 +43,11 @@ const MAY_NAME: [(&str, &[&str]); 11] = [
 const RESERVED: [(&str, &str); 2] = [("rapier3d", "acm-sim"), ("wgpu", "acm-render")];
 
 /// The agent's side: it sees frames and what an arm reports, and cannot name a simulator type.
-const AGENT_SIDE: [&str; 8] = [
+const AGENT_SIDE: [&str; 9] = [
     "acm-actors",
     "acm-baselines",
     "acm-concept",
+    "acm-llm",
     "acm-memory",
     "acm-perception",
     "acm-planner",

@@ -43,17 +43,34 @@ pub fn write(run: &Path, folder: &Path, times: u64) -> PathBuf {
             long.put(record, |value| shift(value, &seq, time * frames, time * events, time * end), time * end);
         }
     }
-    let call = serde_json::json!({ "seq": 3, "request": "Say </script> & <b>bold</b>", "reply": "I say so.", "usage": { "input_tokens": 7 } });
-    let record = Record {
-        topic: "/effect/llm".into(),
-        schema: "acm.Effect".into(),
-        time_ns: 0,
-        data: Vec::new(),
-        value: Some(call),
-    };
-    long.put(&record, |_| (), 0);
+    let last = times * seqs.len() as u64;
+    for (seq, from, to, kind, body) in
+        [(last + 1, "planner", "llm", "ask-llm", asked()), (last + 2, "llm", "planner", "llm-replied", replied())]
+    {
+        let value = serde_json::json!({
+            "seq": seq, "cause": seq - 1, "episode": 1, "from": from, "to": to, "kind": kind, "t": times * end, "body": body
+        });
+        let topic = format!("/{to}/{kind}");
+        let record = Record { topic, schema: "acm.Message".into(), time_ns: 0, data: Vec::new(), value: Some(value) };
+        long.put(&record, |_| (), times * end);
+    }
     long.writer.finish().unwrap();
     path
+}
+
+fn asked() -> Value {
+    serde_json::json!({ "request": {
+        "stage": "parse", "prompt": { "id": "parse", "version": 1 }, "system": "Be brief.",
+        "turns": [{ "who": "user", "parts": [{ "text": "Say </script> & <b>bold</b>" }] }],
+        "schema": {}, "parameters": { "max_output_tokens": 9 },
+    }})
+}
+
+fn replied() -> Value {
+    serde_json::json!({ "reply": {
+        "text": "I say so.", "reasoning": "<i>hm</i>", "usage": { "input": 7, "output": 3, "reasoning": 0, "cached": 0 },
+        "end": "complete", "backend": "test", "model": "test",
+    }})
 }
 
 fn read(run: &Path) -> (Vec<Record>, BTreeMap<String, String>) {

@@ -155,10 +155,11 @@ fn a_thousand_steps_of_hostile_names_stay_a_page() {
     assert_ne!(browser.ask("document.title"), "owned");
     assert_eq!(browser.ask("document.querySelectorAll('img[src=x]').length"), 0);
     // What a model was asked stands beside the message.
-    browser.ask("location.hash = 'seq=3&tab=model'");
+    browser.ask("location.hash = `seq=${calls[0].replied}&tab=model`");
     browser.settle();
     let model = browser.text("#details");
     assert!(model.contains("Say </script> & <b>bold</b>") && model.contains("I say so."), "{model}");
+    assert!(model.contains("<i>hm</i>") && model.contains("7 tokens in, 3 out"), "{model}");
     browser.picture("model");
     assert_eq!(browser.complaints, Vec::<String>::new());
 }

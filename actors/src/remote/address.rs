@@ -38,6 +38,10 @@ pub enum Address {
 impl FromStr for Address {
     type Err = String;
     fn from_str(text: &str) -> Result<Self, String> {
+        // There is no password to give, and what is given here is written down.
+        if let Some((_, host)) = text.rsplit_once('@').filter(|_| text.starts_with("tcp://")) {
+            return Err(format!("the address of `{host}` has a user or a password: robots take none, leave it out"));
+        }
         let fault = |what: &str| Err(format!("`{text}` {what}: write tcp://127.0.0.1:7400 or unix:///path/to/socket"));
         match text.split_once("://") {
             Some(("unix", path)) if path.starts_with('/') => Ok(Address::Unix(path.into())),

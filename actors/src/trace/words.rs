@@ -2,6 +2,7 @@
 
 use crate::{message::Message, report::Ending};
 use acm_concept::{embodiment::Feedback, pose::Pose, skill::SkillReport};
+use acm_llm::Answer;
 use acm_memory::observation::{Grounding, Note, Outcome, Verdict};
 use acm_planner::Decision;
 
@@ -18,6 +19,8 @@ pub enum Level {
 
 /// Most objects that one line names.
 const MAX_NAMED: usize = 8;
+/// Most of a prompt or a reply that one line has, characters.
+const MAX_QUOTED: usize = 100;
 
 /// A message in one line.
 pub fn line(message: &Message) -> (Level, String) {
@@ -26,9 +29,11 @@ pub fn line(message: &Message) -> (Level, String) {
         Message::Interrupt | Message::Wipe | Message::Transplant | Message::Refused { .. } | Message::Broken { .. } => {
             Level::Trouble
         }
-        Message::ActorFailed { .. } | Message::Retreated { failure: Some(_) } | Message::Parsed(Err(_)) => {
-            Level::Trouble
-        }
+        Message::ActorFailed { .. }
+        | Message::Retreated { failure: Some(_) }
+        | Message::Parsed { task: Err(_), .. } => Level::Trouble,
+        Message::Parsed { reading: Some(reading), .. } if reading.fallback.is_some() => Level::Trouble,
+        Message::LlmReplied(answer) if matches!(**answer, Answer::Error(_)) => Level::Trouble,
         Message::Updated { blindness: Some(_), .. } => Level::Trouble,
         Message::Verdict { verdict, .. } if verdict.outcome != Outcome::Verified => Level::Trouble,
         Message::SkillEnded(report) if report.failure.is_some() => Level::Trouble,
@@ -45,7 +50,9 @@ pub fn worth_telling(message: &Message) -> bool {
     matches!(
         message,
         Message::Parse { .. }
-            | Message::Parsed(_)
+            | Message::AskLlm { .. }
+            | Message::LlmReplied(_)
+            | Message::Parsed { .. }
             | Message::Updated { .. }
             | Message::Decided { .. }
             | Message::SkillEnded(_)
@@ -94,11 +101,27 @@ fn text(message: &Message) -> String {
             format!("{kept}; {} objects, {} transitions", view.0.objects().len(), view.0.transitions().len())
         }
         Message::Parse { instruction } => format!("read \"{instruction}\""),
-        Message::Parsed(Ok(task)) => {
-            let subtasks = task.subtasks.iter().enumerate().map(|(i, s)| format!("{} \"{}\"", i + 1, s.text));
-            format!("{} subtasks{}", task.subtasks.len(), listed(": ", subtasks, ""))
+        Message::AskLlm { request } => {
+            let last = request.turns.last().map(acm_llm::Turn::text).unwrap_or_default();
+            let again = if request.turns.len() > 1 { ", again" } else { "" };
+            format!("prompt {}{again}: {}", request.prompt, short(&last))
         }
-        Message::Parsed(Err(reason)) => format!("not understood: {reason}"),
+        Message::LlmReplied(answer) => match &**answer {
+            Answer::Reply(reply) => {
+                format!("{} ({}), {}: {}", reply.model, reply.backend, reply.usage, short(&reply.text))
+            }
+            Answer::Error(error) => format!("no reply: {error}"),
+        },
+        Message::Parsed { task, reading } => {
+            let read = reading.as_ref().map_or_else(String::new, |reading| format!("; {reading}"));
+            match task {
+                Ok(task) => {
+                    let subtasks = task.subtasks.iter().enumerate().map(|(i, s)| format!("{} \"{}\"", i + 1, s.text));
+                    format!("{} subtasks{}{read}", task.subtasks.len(), listed(": ", subtasks, ""))
+                }
+                Err(reason) => format!("not understood: {reason}{read}"),
+            }
+        }
         Message::Decide { situation, .. } => {
             format!("what next? {} looks in a row, {} skills left", situation.looks, situation.skills_left)
         }
@@ -135,6 +158,15 @@ fn text(message: &Message) -> String {
         Message::Ended(report) => {
             format!("{}; {} skills, {} frames", report.ending, report.steps.len(), report.frames_perceived)
         }
+    }
+}
+
+/// The beginning of a text, on one line.
+fn short(text: &str) -> String {
+    let line = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    match line.char_indices().nth(MAX_QUOTED) {
+        Some((end, _)) => format!("{}...", line.get(..end).unwrap_or_default()),
+        None => line,
     }
 }
 

@@ -246,22 +246,32 @@ function messagePanel(row) {
   const many = row.last > row.seq;
   const head = make("div", {}, make("span", { class: "strong" }, many ? `${row.seq} to ${row.last}` : String(row.seq)), `  ${row.from} ${many ? "\u2194" : "\u2192"} ${row.to}  `,
     make("span", { class: "strong" }, row.kind), `  ${row.t.toFixed(3)} s, `, row.cause === null ? "from outside" : make("span", {}, "caused by ", go(row.cause)));
-  const body = many ? none("Ticks of a skill are one row. `acm trace show FILE --seq N` has each.")
+  const call = callOf(row);
+  const body = call ? make("div", {}, ...callView(call)) : many ? none("Ticks of a skill are one row. `acm trace show FILE --seq N` has each.")
     : row.body === null ? none(data.left_out.length ? "No body is on this page." : "This kind has no body.") : make("div", { class: "mono" }, tree(null, row.body));
   const wrote = changes.filter(change => change.seq >= row.seq && change.seq <= row.last);
   return [head, make("p", {}, row.line), ...(wrote.length ? [make("h3", {}, "Changed in memory"), ...wrote.map(change => make("div", {}, change.words))] : []), make("h3", {}, "Body (numbers to five decimals)"), body];
 }
 
+/// One call of a model: what was said, and what came of it.
+function callView(call) {
+  const heading = (text, ...more) => make("h3", {}, text, ...more);
+  return [heading("Prompt ", go(call.seq), make("span", { class: "faint" }, `  ${call.prompt}`)),
+    ...call.turns.flatMap(([who, text]) => [make("div", { class: "faint" }, who), make("pre", {}, text)]),
+    heading("Reply ", ...(call.replied === null ? [] : [go(call.replied)])), make("p", { class: call.reply === null ? "bad" : "faint" }, call.note),
+    ...(call.reasoning ? [make("div", { class: "faint" }, "reasoning"), make("pre", {}, call.reasoning)] : []),
+    ...(call.reply === null ? [] : [make("pre", {}, call.reply)])];
+}
+
+const callOf = row => calls.find(call => call.seq === row.seq || call.replied === row.seq);
+
 function modelPanel(seq) {
+  const own = callOf(rows[picked]);
+  if (own) return callView(own);
   const step = steps[stepOf(seq)];
   const [from, to] = step ? [step.seq, step.last] : [0, steps[0]?.seq ?? Infinity];
-  const row = rows[rowOf(seq)];
-  // What a decision rests on was asked before it was sent: in the handling of its cause.
-  const start = rows[chainOf(picked).at(-1)];
-  const asked = calls.filter(call => (call.seq >= from && call.seq <= to) || call.seq === start.cause || call.seq === row.cause);
-  if (!asked.length) return [none(calls.length ? `No model was asked here. The trace has ${calls.length} calls:` : "No model was asked in this run."),
+  const asked = calls.filter(call => call.seq >= from && call.seq <= to);
+  if (asked.length) return asked.flatMap(callView);
+  return [none(calls.length ? `No model was asked here. The trace has ${calls.length} calls:` : "No model was asked in this run."),
     ...calls.slice(0, 200).map(call => make("div", {}, go(call.seq)))];
-  const words = value => typeof value === "string" ? value : JSON.stringify(value, null, 2);
-  return asked.flatMap(call => [make("h3", {}, "Asked while handling ", go(call.seq), call.usage ? make("span", {}, `  ${JSON.stringify(call.usage)}`) : ""),
-    make("h3", {}, "Prompt"), make("pre", {}, words(call.request)), make("h3", {}, "Reply"), make("pre", {}, words(call.reply))]);
 }

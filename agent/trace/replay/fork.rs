@@ -6,6 +6,7 @@ use crate::{
     config,
     episode::{EpisodeConfig, Fork, Runner},
     inject::{Faults, Injection},
+    llm::Llm,
     run::{exit_of, prepare, print_judgement},
     trace::recording::TraceRequest,
 };
@@ -32,7 +33,16 @@ pub(super) fn run(recorded: &Recorded, args: &TraceReplayArgs, after: u64) -> an
     run.set.extend(otherwise.set.iter().cloned());
     let name = run.scenario.as_deref().context("the run was on a robot in another process: it has no simulator")?;
     let scenario = Scenario::open_with(name, &run.set)?;
+    // Up to the fork the model replies as it did; what the last recorded message asks is asked of the other one.
+    let (id, other) = (std::mem::take(&mut run.llm), Signal::default());
+    let before = recorded.llm(id.clone())?;
+    run.llm = otherwise.llm.clone().unwrap_or(id);
     let (config, library) = prepare(&run)?;
+    let afterwards = config.llm.clone().map(Box::new);
+    let llm = match before {
+        Some(before) => Some(Llm::Fork { before, after: afterwards, from: other.clone() }),
+        None => config.llm.clone(),
+    };
     let memory = recorded.memory()?;
     let settings = recorded.settings()?.unwrap_or(config.settings);
     let mut then = otherwise.config.as_deref().map(config::read).transpose()?.unwrap_or_else(|| settings.clone());
@@ -40,12 +50,17 @@ pub(super) fn run(recorded: &Recorded, args: &TraceReplayArgs, after: u64) -> an
     let begins = Signal::default();
     let config = EpisodeConfig {
         memory: memory.as_ref().map(|folder| folder.path().to_path_buf()),
+        llm,
         trace: otherwise.trace.clone().map(|path| TraceRequest { path, frames: FrameDetail::default() }),
         settings,
         fork: Some(Fork { begins: begins.clone(), cameras: Faults::new(&cameras), settings: then }),
         ..config
     };
-    let comparison = Arc::new(Comparison { fork: Some((after, begins)), ..Comparison::new(recorded, args) });
+    let comparison = Arc::new(Comparison {
+        fork: Some((after, begins)),
+        other_llm: Some((after, other)),
+        ..Comparison::new(recorded, args)
+    });
     let runner = Runner::with_library(library)?;
     runner.end_on_ctrl_c();
     let journal = Arc::clone(&comparison) as Arc<dyn Journal<Message>>;

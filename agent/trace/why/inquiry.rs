@@ -134,21 +134,29 @@ impl<'a> Answer<'a> {
         let seq = decided.header.seq;
         let end = self.all.run.entries.partition_point(|entry| entry.header.seq < seq);
         let before = self.all.run.entries.get(..end).unwrap_or_default();
-        let mut sources = vec![Some(seq), decided.header.cause];
         if let Some(parsed) = before.iter().rev().find(|entry| entry.header.kind == "parsed") {
-            let asked = parsed.header.cause.and_then(|cause| self.all.run.entry(cause));
+            let asked = self.causes(parsed).find(|entry| entry.header.kind == "parse");
             let title = asked.map_or_else(|| parsed.line.clone(), |asked| asked.line.clone());
             let source = format!("i{}", parsed.header.seq);
             self.node(&source, Kind::Instruction, Some(parsed.header.seq), title, vec![parsed.line.clone()]);
             self.link(id, &source, "asked for by");
-            sources.extend([Some(parsed.header.seq), parsed.header.cause]);
+            self.model(id, parsed);
         }
-        let calls = self.all.run.effects.iter().filter(|e| e.kind == "llm" && sources.contains(&Some(e.seq)));
-        for (number, call) in calls.enumerate() {
-            let model = format!("c{}.{number}", call.seq);
-            let usage = call.record.get("usage").map_or_else(String::new, decision::shortened);
-            self.node(&model, Kind::Model, Some(call.seq), format!("a model was asked   {usage}"), Vec::new());
-            self.link(id, &model, "a model said");
+    }
+
+    /// The message that caused one, the one that caused that, and so on.
+    fn causes(&self, entry: &'a Entry) -> impl Iterator<Item = &'a Entry> + use<'a> {
+        let run = self.all.run;
+        std::iter::successors(Some(entry), move |entry| run.entry(entry.header.cause?)).skip(1)
+    }
+
+    /// What a model was asked, and replied, before an instruction was read.
+    fn model(&mut self, id: &str, parsed: &'a Entry) {
+        let said: Vec<&Entry> = self.causes(parsed).take_while(|entry| entry.header.kind != "parse").collect();
+        for entry in said.into_iter().rev() {
+            let node = format!("c{}", entry.header.seq);
+            self.node(&node, Kind::Model, Some(entry.header.seq), entry.line.clone(), Vec::new());
+            self.link(id, &node, "a model said");
         }
     }
 

@@ -176,6 +176,19 @@ impl Lexicon {
     pub fn colors(&self) -> impl Iterator<Item = &ColorTerm> {
         self.colors.iter().map(|(term, _)| term)
     }
+    /// Words that make a colour darker or lighter, each with the change of lightness (CIELAB L).
+    pub(crate) fn shade_words(&self) -> impl Iterator<Item = (&str, f64)> {
+        self.shades.iter().filter(|(lightness, _)| *lightness != 0.0).filter_map(|(lightness, forms)| {
+            let Element::Words { any, .. } = forms.first()?.first()? else { return None };
+            Some((any.first()?.as_str(), *lightness))
+        })
+    }
+    /// The colour of this name, made darker or lighter.
+    pub(crate) fn shaded(&self, name: &str, lightness: f64) -> Option<ColorTerm> {
+        let mut term = self.colors().find(|term| term.name == name)?.clone();
+        term.lab.l = (term.lab.l + lightness).clamp(0.0, 100.0);
+        Some(term)
+    }
     /// The colour word whose prototype is nearest to a surface colour. Lightness counts half: shading changes it
     /// most.
     pub(crate) fn nearest_color(&self, lab: &Lab) -> Option<&ColorTerm> {

@@ -7,6 +7,7 @@
 //! | module | holds |
 //! |---|---|
 //! | [`language`] | instruction to [`Task`]: words, phrases, clauses, anaphora |
+//! | [`hybrid`] | the same by a language model: what it is asked, and a task out of its answer |
 //! | [`lexicon`] | the data that the language rules run on |
 //! | [`task`] | goals over references |
 //! | `ground` | references to objects and places, against memory |
@@ -20,6 +21,7 @@ mod decide;
 pub mod decision;
 pub mod explanation;
 mod ground;
+pub mod hybrid;
 pub mod language;
 pub mod lexicon;
 mod planner;
@@ -29,6 +31,7 @@ pub mod task;
 pub use bind::BindError;
 pub use decision::{Decision, GiveUpCause, PlanOptions, Situation, Step, Unknown};
 pub use explanation::{Explanation, Grounds, Rejected, ResolvedReference};
+pub use hybrid::TaskPrompt;
 pub use language::ParseError;
 pub use lexicon::{Lexicon, LexiconError};
 pub use planner::{Planner, embedded_lexicon};

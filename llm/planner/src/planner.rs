@@ -4,6 +4,7 @@ use crate::{
     bind::{self, BindError},
     decide,
     decision::{Decision, PlanOptions, Situation, Step},
+    hybrid::{self, TaskPrompt},
     language::{self, ParseError},
     lexicon::{Lexicon, LexiconError},
     task::Task,
@@ -52,6 +53,27 @@ impl Planner {
     /// the span; nothing is guessed.
     pub fn parse(&self, instruction: &str, library: &TemplateLibrary) -> Result<Task, ParseError> {
         language::parse(&self.lexicon, library, instruction)
+    }
+    /// What a language model is asked in order to read an instruction.
+    ///
+    /// # Errors
+    /// The instruction is empty or too long: no model is asked then.
+    pub fn prompt(&self, instruction: &str, library: &TemplateLibrary) -> Result<TaskPrompt, ParseError> {
+        hybrid::prompt(&self.lexicon, library, instruction)
+    }
+    /// The task that a model's answer to [`Planner::prompt`] stands for; else what in it does not fit the instruction
+    /// or the library.
+    pub fn understand(
+        &self,
+        instruction: &str,
+        library: &TemplateLibrary,
+        answer: &serde_json::Value,
+    ) -> Result<Task, Vec<String>> {
+        hybrid::understand(&self.lexicon, library, instruction, answer)
+    }
+    /// The answer that stands for a task.
+    pub fn answer(&self, task: &Task) -> hybrid::TaskForm {
+        hybrid::TaskForm::new(&self.lexicon, task)
     }
     /// The next step of a task as memory stands.
     pub fn decide(&self, task: &Task, view: &dyn MemoryView, situation: &Situation, options: &PlanOptions) -> Decision {

@@ -21,7 +21,21 @@ fn library() -> TemplateLibrary {
 fn parse(text: &str) -> Result<Task, ParseError> {
     static MIND: OnceLock<(Planner, TemplateLibrary)> = OnceLock::new();
     let (planner, library) = MIND.get_or_init(|| (Planner::new().unwrap(), library()));
-    planner.parse(text, library)
+    let task = planner.parse(text, library)?;
+    comes_back(planner, library, &task);
+    Ok(task)
+}
+
+/// What the rules read can be said in the form in which a language model answers, and read back from it.
+fn comes_back(planner: &Planner, library: &TemplateLibrary, task: &Task) {
+    static SCHEMA: OnceLock<jsonschema::Validator> = OnceLock::new();
+    let text = &task.instruction;
+    let schema = || jsonschema::validator_for(&planner.prompt(text, library).unwrap().schema).unwrap();
+    let answer = serde_json::to_value(planner.answer(task)).unwrap();
+    let faults: Vec<String> =
+        SCHEMA.get_or_init(schema).iter_errors(&answer).map(|e| format!("{}: {e}", e.instance_path())).collect();
+    assert_eq!(faults, Vec::<String>::new(), "{text}");
+    assert_eq!(planner.understand(text, library, &answer).as_ref(), Ok(task), "{text}");
 }
 
 fn outline(text: &str) -> Vec<String> {
@@ -43,6 +57,18 @@ fn the_paraphrases_in_use_ask_for_the_same() {
 #[test]
 fn unseen_paraphrases_ask_for_the_same() {
     check_paraphrases(include_str!("paraphrases_unseen.txt"));
+}
+
+#[test]
+fn all_that_a_phrase_can_say_comes_back() {
+    for text in [
+        "Do not touch the dark blue cube. Put the cube on the left mat between the red cube and the can.",
+        "Put a cube beside the second mat from the right; put the other cube to the left of it.",
+        "Put the light green cube on the free mat, then pick up the largest block.",
+        "Put the cube on the mat. Take the cube on the mat and put it where it was at the start.",
+    ] {
+        parse(text).unwrap_or_else(|error| panic!("{text}: {error}"));
+    }
 }
 
 #[test]

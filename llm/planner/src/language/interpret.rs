@@ -4,6 +4,7 @@ use super::{
     ParseError,
     clause::{Clause, Order, Statement},
     phrase::{NounPhrase, PlaceKind, PlacePhrase},
+    role::{Role, SUPPORTIVE},
 };
 use crate::{
     lexicon::FrameGoal,
@@ -11,22 +12,6 @@ use crate::{
 };
 use acm_concept::template::TemplateLibrary;
 use acm_memory::query::PlaceReference;
-
-/// Affordance of what can carry things.
-const SUPPORTIVE: &str = "supportive";
-
-/// What a thing must be able to do to fill a gap in a clause.
-#[derive(Debug, Clone, PartialEq)]
-enum Role {
-    /// Be brought about by some function with this effect.
-    Effect(&'static str),
-    /// Offer this function.
-    Function(String),
-    /// Have this affordance.
-    Affordance(&'static str),
-    /// Nothing in particular.
-    Mentioned,
-}
 
 /// Joins statements to a task.
 pub(super) fn interpret(library: &TemplateLibrary, text: &str, statements: &[Statement]) -> Result<Task, ParseError> {
@@ -42,14 +27,9 @@ pub(super) fn interpret(library: &TemplateLibrary, text: &str, statements: &[Sta
         return Err(ParseError::Empty);
     }
     reading.drop_parts_of_moves();
-    reading.settle_subtasks();
-    let mut nouns: Vec<String> = Vec::new();
-    for noun in reading.references.iter().filter_map(|reference| reference.noun.as_ref()) {
-        if !nouns.contains(noun) {
-            nouns.push(noun.clone());
-        }
-    }
-    let (subtasks, references) = (reading.subtasks, reading.references);
+    let (subtasks, mut references) = (reading.subtasks, reading.references);
+    settle_subtasks(&subtasks, &mut references);
+    let nouns = nouns_of(&references);
     Ok(Task { instruction: text.into(), subtasks, references, untouched, nouns })
 }
 
@@ -260,7 +240,7 @@ impl Interpretation<'_> {
         let fits = |known: &ObjectReference| {
             let noun = match &phrase.noun {
                 Some(noun) => known.noun.as_ref() == Some(noun),
-                None => fits_role(self.library, known.noun.as_deref(), role),
+                None => role.fits(self.library, known.noun.as_deref()),
             };
             noun && group(phrase.quantity) == group(known.quantity)
                 && (phrase.color.is_none() || phrase.color == known.color)
@@ -294,9 +274,8 @@ impl Interpretation<'_> {
     /// What a pronoun stands for: the thing acted on last that can play the role.
     fn antecedent(&self, span: Span, role: &Role) -> Result<ReferenceIndex, ParseError> {
         let single = |index: ReferenceIndex| self.references.get(index).filter(|r| r.quantity != Quantity::Group);
-        let fits = |index: &ReferenceIndex| {
-            single(*index).is_some_and(|known| fits_role(self.library, known.noun.as_deref(), role))
-        };
+        let fits =
+            |index: &ReferenceIndex| single(*index).is_some_and(|known| role.fits(self.library, known.noun.as_deref()));
         let acted_on = self.subtasks.iter().rev().map(|subtask| subtask.goal.object());
         let mentioned = (0..self.references.len()).rev();
         acted_on
@@ -306,18 +285,10 @@ impl Interpretation<'_> {
     }
 
     fn check_role(&self, phrase: &NounPhrase, role: &Role) -> Result<(), ParseError> {
-        if fits_role(self.library, phrase.noun.as_deref(), role) {
-            return Ok(());
+        match role.misfit(self.library, phrase.noun.as_deref()) {
+            None => Ok(()),
+            Some(reason) => Err(self.unsupported(phrase.span, &reason)),
         }
-        let noun = phrase.noun.as_deref().unwrap_or_default();
-        let reason = match role {
-            Role::Effect("holding") => format!("no kind of {noun} that I know can be picked up"),
-            Role::Effect(_) => format!("no kind of {noun} that I know can be moved"),
-            Role::Function(function) => format!("no kind of {noun} that I know has the function {function}"),
-            Role::Affordance(_) => format!("no kind of {noun} that I know can carry things"),
-            Role::Mentioned => return Ok(()),
-        };
-        Err(self.unsupported(phrase.span, &reason))
     }
 
     fn unsupported(&self, span: Span, reason: &str) -> ParseError {
@@ -346,29 +317,39 @@ impl Interpretation<'_> {
         }
         self.subtasks = kept;
     }
+}
 
-    /// Tells each reference the first subtask that uses it.
-    fn settle_subtasks(&mut self) {
-        for reference in &mut self.references {
-            reference.subtask = u32::MAX;
+/// Tells each reference the first subtask that uses it.
+pub(crate) fn settle_subtasks(subtasks: &[Subtask], references: &mut [ObjectReference]) {
+    for reference in references.iter_mut() {
+        reference.subtask = u32::MAX;
+    }
+    for (subtask, index) in subtasks.iter().zip(0..) {
+        let mut used = vec![subtask.goal.object()];
+        if let Goal::At { destination, .. } = &subtask.goal {
+            used.extend(named_in(destination));
         }
-        for index in 0..self.subtasks.len() {
-            let Some(subtask) = self.subtasks.get(index) else { break };
-            let mut used = vec![subtask.goal.object()];
-            if let Goal::At { destination, .. } = &subtask.goal {
-                used.extend(named_in(destination));
-            }
-            while let Some(next) = used.pop() {
-                let Some(reference) = self.references.get_mut(next).filter(|r| r.subtask == u32::MAX) else { continue };
-                reference.subtask = index as u32;
-                used.extend(reference.located.as_deref().map(named_in).unwrap_or_default());
-                used.extend(&reference.other_than);
-            }
-        }
-        for reference in self.references.iter_mut().filter(|r| r.subtask == u32::MAX) {
-            reference.subtask = 0;
+        while let Some(next) = used.pop() {
+            let Some(reference) = references.get_mut(next).filter(|r| r.subtask == u32::MAX) else { continue };
+            reference.subtask = index;
+            used.extend(reference.located.as_deref().map(named_in).unwrap_or_default());
+            used.extend(&reference.other_than);
         }
     }
+    for reference in references.iter_mut().filter(|r| r.subtask == u32::MAX) {
+        reference.subtask = 0;
+    }
+}
+
+/// The library's nouns that references use, each once.
+pub(crate) fn nouns_of(references: &[ObjectReference]) -> Vec<String> {
+    let mut nouns: Vec<String> = Vec::new();
+    for noun in references.iter().filter_map(|reference| reference.noun.as_ref()) {
+        if !nouns.contains(noun) {
+            nouns.push(noun.clone());
+        }
+    }
+    nouns
 }
 
 /// References in a destination.
@@ -380,20 +361,6 @@ fn named_in(destination: &Destination) -> Vec<ReferenceIndex> {
         Destination::Exchanged { with, .. } => vec![*with],
         Destination::History { object, .. } => vec![*object],
     }
-}
-
-/// Whether some template that carries the noun can play the role; a thing without noun may.
-fn fits_role(library: &TemplateLibrary, noun: Option<&str>, role: &Role) -> bool {
-    let Some(noun) = noun else { return true };
-    library.with_noun(noun).any(|template| match role {
-        Role::Effect(predicate) => template
-            .functions
-            .iter()
-            .any(|f| f.effects.iter().any(|effect| effect.predicate == *predicate && !effect.negated)),
-        Role::Function(name) => template.function(name).is_some(),
-        Role::Affordance(affordance) => template.affordances().any(|known| *known == **affordance),
-        Role::Mentioned => true,
-    })
 }
 
 /// Writes down what the role asks of the thing, where that is more than was asked so far.

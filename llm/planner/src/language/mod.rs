@@ -9,10 +9,13 @@ mod interpret;
 mod phrase;
 mod place;
 mod reader;
+mod role;
 mod token;
 
 pub use clause::MAX_CLAUSES;
 pub use error::ParseError;
+pub(crate) use interpret::{nouns_of, settle_subtasks};
+pub(crate) use role::{Role, SUPPORTIVE};
 pub use token::{MAX_BYTES, MAX_TOKENS};
 
 use crate::{lexicon::Lexicon, task::Task};
