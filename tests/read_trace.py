@@ -62,6 +62,14 @@ def compare(path, found):
     assert run.steps and run.steps[0].body("verdict") and "asked for by" in run.steps[0].reason
     changed = next(change["object"] for change in run.changes if change["change"] == "object")
     assert run.changes_of(changed)
+    # Adding the changes up from any keyframe leads to the next one.
+    for keyframe in run.keyframes[1:]:
+        assert run.believed(keyframe["seq"] + 1) == keyframe["objects"]
+        without = [other for other in run.keyframes if other["seq"] < keyframe["seq"]]
+        every, run.keyframes = run.keyframes, without
+        assert run.believed(keyframe["seq"] + 1) == keyframe["objects"]
+        run.keyframes = every
+    assert {state["actor"] for state in run.states} == {"episode", "executor", "perception"} and run.calls == []
     try:
         next(iter(run.frames.values())).color
     except ValueError as error:

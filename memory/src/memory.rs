@@ -106,6 +106,19 @@ impl AcmMemory {
         Ok(())
     }
 
+    /// Believes what the events come to and nothing else; the log then holds them alone.
+    fn replace(&mut self, events: Vec<Event>) -> Result<(), MemoryError> {
+        let mut state = State::default();
+        let fault = events.iter().try_for_each(|event| state.apply(event)).err();
+        self.check(&events, fault)?;
+        if let Some(log) = &mut self.log {
+            log.replace(&events)?;
+        }
+        self.state = state;
+        self.recent.add(events);
+        Ok(())
+    }
+
     /// Refuses a batch that could not be read back: it would make the whole log unreadable.
     fn check(&self, events: &[Event], fault: Option<String>) -> Result<(), MemoryError> {
         let refuse = |reason| {
@@ -192,30 +205,12 @@ impl Memory for AcmMemory {
             evidence: Vec::new(),
             change: Change::Wiped(counters),
         };
-        let mut state = State::default();
-        let fault = state.apply(&event).err();
-        let events = [event];
-        self.check(&events, fault)?;
-        if let Some(log) = &mut self.log {
-            log.replace(&events)?;
-        }
-        self.state = state;
-        self.recent.add(events);
-        Ok(())
+        self.replace(vec![event])
     }
     fn transplant(&mut self, donated: &[Event]) -> Result<(), MemoryError> {
         let (moment, source) = (self.state.moment(), Source::Agent);
         let wiped = Event { moment, source, evidence: Vec::new(), change: Change::Wiped(Counters::default()) };
-        let events: Vec<Event> = std::iter::once(wiped).chain(donated.iter().cloned()).collect();
-        let mut state = State::default();
-        let fault = events.iter().try_for_each(|event| state.apply(event)).err();
-        self.check(&events, fault)?;
-        if let Some(log) = &mut self.log {
-            log.replace(&events)?;
-        }
-        self.state = state;
-        self.recent.add(events);
-        Ok(())
+        self.replace(std::iter::once(wiped).chain(donated.iter().cloned()).collect())
     }
     fn view(&self) -> Arc<dyn MemoryView> {
         Arc::new(self.snapshot())

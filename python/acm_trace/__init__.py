@@ -6,6 +6,7 @@ virtual, in nanoseconds as `t` and in seconds as `seconds`.
 
 import io
 import json
+import re
 from dataclasses import dataclass, field
 from typing import Any, Dict, List, Optional
 
@@ -61,6 +62,11 @@ class Frame:
         return Image.open(io.BytesIO(self.thumbnail_png))
 
 
+def _topic_name(camera: str) -> str:
+    """A camera's name as it stands in topics."""
+    return re.sub(r"[^A-Za-z0-9_-]", "_", camera[:64])
+
+
 @dataclass
 class Step:
     """A skill that was run: the decision, and the messages from it up to the next one."""
@@ -90,6 +96,10 @@ class Trace:
         self.attachments: Dict[str, bytes] = {}
         self.messages: List[Dict[str, Any]] = []
         self.changes: List[Dict[str, Any]] = []
+        self.keyframes: List[Dict[str, Any]] = []
+        """All that memory believed, at several moments."""
+        self.states: List[Dict[str, Any]] = []
+        """What actors kept between messages, wherever it changed."""
         self.lines: Dict[int, str] = {}
         self.frames: Dict[str, Frame] = {}
         self.cut: Optional[str] = None
@@ -133,10 +143,14 @@ class Trace:
             self.messages.append(record)
         elif schema == "acm.MemoryDelta":
             self.changes.append(record)
+        elif schema == "acm.MemoryKeyframe":
+            self.keyframes.append(record)
+        elif schema == "acm.ActorState":
+            self.states.append(record)
         elif topic == "/effect/frame":
             frame = Frame(record)
             self.frames[frame.id] = frame
-            self._asked[(record["camera"], record["seq"])] = frame
+            self._asked[(_topic_name(record["camera"]), record["seq"])] = frame
 
     def _viewer(self, topic, sequence, decoded):
         if topic == "/log":
@@ -180,6 +194,26 @@ class Trace:
             if steps:
                 steps[-1].messages.append(message)
         return steps
+
+    @property
+    def calls(self) -> List[Dict[str, Any]]:
+        """The questions to a language model, each with its answer; None for one that never came."""
+        answers = {m["cause"]: m["body"] for m in self.messages if m["kind"] == "llm-replied"}
+        asked = (m for m in self.messages if m["kind"] == "ask-llm")
+        return [{"seq": m["seq"], "request": m["body"]["request"], "answer": answers.get(m["seq"])} for m in asked]
+
+    def believed(self, seq: int) -> Dict[str, Dict[str, Any]]:
+        """What memory believed of each object just before a message: a keyframe, and what changed since."""
+        before = [keyframe for keyframe in self.keyframes if keyframe["seq"] < seq]
+        objects = dict(before[-1]["objects"]) if before else {}
+        since = before[-1]["event"] if before else 0
+        for change in self.changes:
+            if since < change["event"] and change["seq"] < seq:
+                if change["change"] == "object":
+                    objects[change["object"]] = change["after"]
+                elif change["change"] == "wiped":
+                    objects.clear()
+        return objects
 
     def changes_of(self, object_id: str) -> List[Dict[str, Any]]:
         """What memory came to believe of an object such as `O3`, in order."""
