@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
 # Records runs over all scenarios, with and without faults, and replays each in a second process.
-#   scripts/replay.sh [RUNS] [FIRST_SEED]      200 runs from seed 0 on
+#   scripts/replay.sh [RUNS] [FIRST_SEED] [SKIP]      200 runs from seed 0 on, the first SKIP of them left out
 # ACM names the program that records, REPLAY_WITH another one that replays, such as a build of its own of the same sources.
 # Half of the runs keep their frames and are replayed from the trace alone; of the others physics and renderer run again.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-readonly runs=${1:-200} first=${2:-0}
+readonly runs=${1:-200} first=${2:-0} skip=${3:-0}
 readonly acm=${ACM:-target/release/acm}
 readonly replayer=${REPLAY_WITH:-$acm}
 for program in "$acm" "$replayer"; do
@@ -28,7 +28,7 @@ readonly faults=('' '--inject black-frames' '--inject freeze-frames' '--inject s
     "--llm scripted=$folder/model.toml" "--config $folder/agent.toml" '--inject panic@llm:1')
 
 identical=0 others=0
-for ((run = 0; run < runs; run++)); do
+for ((run = skip; run < runs; run++)); do
     scenario=${scenarios[run % ${#scenarios[@]}]}
     fault=${faults[run / ${#scenarios[@]} % ${#faults[@]}]}
     seed=$((first + run))
@@ -46,5 +46,5 @@ for ((run = 0; run < runs; run++)); do
     fi
     if [ -t 1 ]; then printf '\r%d of %d' "$((run + 1))" "$runs"; fi
 done
-printf '\n%d of %d runs replayed identically\n' "$identical" "$runs"
+printf '\n%d of %d runs replayed identically\n' "$identical" "$((runs - skip))"
 ((others == 0))
