@@ -282,7 +282,9 @@ fn absent(entry: &ObjectEntry, percepts: &Percepts, grounding: &Grounding) -> Op
 fn blind_words(blindness: Blindness) -> &'static str {
     match blindness {
         Blindness::NoDepth => "almost no depth from 0.12 to 6 m: the depth image is empty, or --depth-scale is wrong",
+        Blindness::DepthScale => "the depth is nearly all nearer than 0.12 or farther than 6 m: --depth-scale is wrong",
         Blindness::NoColor => "the colour image is black",
+        Blindness::Overexposed => "the colour image is white",
         Blindness::NoSupport => {
             "no level surface on which things could stand: there is none, or the intrinsics or the pose are wrong"
         }

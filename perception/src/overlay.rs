@@ -50,7 +50,9 @@ pub fn draw(frame: &RgbdFrame, percepts: &Percepts, names: &[Option<String>], li
     if let Some(blindness) = percepts.blindness {
         let reason = match blindness {
             Blindness::NoDepth => "blind: no depth",
+            Blindness::DepthScale => "blind: the depth is in another unit",
             Blindness::NoColor => "blind: the colour image is black",
+            Blindness::Overexposed => "blind: the colour image is white",
             Blindness::NoSupport => "blind: no surface on which things could stand",
         };
         note(&mut image, &[reason.into()]);

@@ -9,6 +9,15 @@ use acm_concept::{
 use glam::DVec3;
 use std::sync::OnceLock;
 
+/// An image with fewer bright pixels is black. A white one must be whiter still: a bright table may nearly fill it.
+const FEW_BRIGHT: f64 = 0.05;
+const FEW_COLORED: f64 = 0.01;
+/// A channel from this value on is saturated.
+const WHITE: u8 = 250;
+/// Depth in another unit: this share of the pixels was measured, and so many times more than are believed.
+const MEASURED: f64 = 0.5;
+const TIMES_BELIEVED: f64 = 10.0;
+
 /// A frame as the pipeline reads it. All planes have the shape of `grid`.
 pub(crate) struct Scan {
     pub grid: Grid,
@@ -61,10 +70,17 @@ impl Scan {
         let depth: Vec<f32> = frame.depth.iter().map(believed).collect();
         let depth_fraction = depth.iter().filter(|z| **z > 0.0).count() as f64 / grid.len() as f64;
         if depth_fraction < config.min_depth_fraction {
-            return Err((Blindness::NoDepth, depth_fraction));
+            let measured = frame.depth.iter().filter(|z| z.is_finite() && **z > 0.0).count() as f64 / grid.len() as f64;
+            let scaled = measured > MEASURED && measured > TIMES_BELIEVED * depth_fraction;
+            let reason = if scaled { Blindness::DepthScale } else { Blindness::NoDepth };
+            return Err((reason, depth_fraction));
         }
-        if is_black(&frame.color, config.min_brightness) {
+        let brightest = |pixel: &[u8]| pixel.iter().copied().max().unwrap_or(0) >= config.min_brightness;
+        if share(&frame.color, brightest) < FEW_BRIGHT {
             return Err((Blindness::NoColor, depth_fraction));
+        }
+        if share(&frame.color, |pixel| pixel.iter().any(|value| *value < WHITE)) < FEW_COLORED {
+            return Err((Blindness::Overexposed, depth_fraction));
         }
         let smooth = smooth(grid, &depth, config);
         let lab = frame.color.chunks_exact(3).map(|p| to_lab([p[0], p[1], p[2]])).collect();
@@ -98,14 +114,10 @@ impl Scan {
     }
 }
 
-/// Whether even the 95th percentile of the brightness is below the limit.
-fn is_black(color: &[u8], limit: u8) -> bool {
-    let (mut bright, mut total) = (0usize, 0usize);
-    for pixel in color.chunks_exact(3).step_by(7) {
-        total += 1;
-        bright += usize::from(pixel.iter().copied().max().unwrap_or(0) >= limit);
-    }
-    bright * 20 < total
+/// The share of the pixels of which something holds, from a sample.
+fn share(color: &[u8], holds: impl Fn(&[u8]) -> bool) -> f64 {
+    let pixels = || color.chunks_exact(3).step_by(7);
+    pixels().filter(|pixel| holds(pixel)).count() as f64 / pixels().count().max(1) as f64
 }
 
 /// Averages each depth with those of its 5x5 neighbours that lie on the same surface; fills lone holes.

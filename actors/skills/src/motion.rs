@@ -206,6 +206,7 @@ mod tests {
             let from = downward(DVec3::new(0.1, -0.1, from_z), 0.2);
             let goal = downward(DVec3::new(x, y, z), heading);
             let mut path = Path::over(from, goal, height, PACE, TICK_S);
+            let end = path.end();
             let (mut at, mut speed) = (from, DVec3::ZERO);
             while let Some(next) = path.advance() {
                 let step = next.translation - at.translation;
@@ -217,8 +218,19 @@ mod tests {
                 prop_assert!(!level || next.translation.z >= height - 1e-9);
                 (at, speed) = (next, step);
             }
-            prop_assert!(at.translation.distance(goal.translation) < 1e-9 && at.angle_to(&goal) < 1e-6);
+            prop_assert!(at.translation.distance(end.translation) < 1e-12 && at.angle_to(&end) < 1e-6);
+            // A last leg that is negligible is left out.
+            prop_assert!(end.translation.distance(goal.translation) < NEGLIGIBLE && end.angle_to(&goal) < NEGLIGIBLE);
         }
+    }
+
+    #[test]
+    fn a_negligible_last_leg_is_left_out() {
+        let (from, goal) = (downward(DVec3::ZERO, 0.0), downward(DVec3::new(0.0, 0.0, 0.33274992), 0.0));
+        let mut path = Path::over(from, goal, 0.33275062, PACE, TICK_S);
+        let last = std::iter::from_fn(|| path.advance()).last().unwrap();
+        assert_eq!(last, path.end());
+        assert!((last.translation.z - 0.33275062).abs() < 1e-12);
     }
 
     #[test]

@@ -222,8 +222,13 @@ pub struct ExpectedView {
 pub enum Blindness {
     /// No, or almost no, depth was measured.
     NoDepth,
+    /// Depth was measured, but nearly all of it lies nearer or farther than any sensor of this kind sees: it is likely in
+    /// another unit than metres.
+    DepthScale,
     /// The colour image is black.
     NoColor,
+    /// The colour image is white: overexposed.
+    Overexposed,
     /// There is depth, but no surface on which things could stand.
     NoSupport,
 }

@@ -183,6 +183,10 @@ fn blindness_is_an_answer() {
         (with(vec![0; 3 * pixels], frame.depth.to_vec()), Blindness::NoColor),
         (with(frame.color.to_vec(), vec![0.0; pixels]), Blindness::NoDepth),
         (with(frame.color.to_vec(), vec![f32::NAN; pixels]), Blindness::NoDepth),
+        // Metres taken for millimetres, and millimetres for metres.
+        (with(frame.color.to_vec(), frame.depth.iter().map(|z| 1e-3 * z).collect()), Blindness::DepthScale),
+        (with(frame.color.to_vec(), frame.depth.iter().map(|z| 1e3 * z).collect()), Blindness::DepthScale),
+        (with(vec![255; 3 * pixels], frame.depth.to_vec()), Blindness::Overexposed),
         // A wall: depth, but nothing to stand on.
         (with(frame.color.to_vec(), vec![1.0; pixels]), Blindness::NoSupport),
     ];
