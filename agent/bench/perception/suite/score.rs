@@ -194,6 +194,8 @@ fn compare(thing: &Thing, object: &GroundedObject, library: &TemplateLibrary, bi
     match &thing.template {
         Some(truth) => match library.get(&truth.template) {
             Some(template) => {
+                let world = parts_iou(&thing.pose, template, &truth.values, object, library);
+                tally.world_part_iou.extend(world);
                 // What colour alone shows has no thickness to share.
                 if template.seen_by == SeenBy::Depth {
                     let pose = Pose { translation: thing.pose.translation + bias, ..thing.pose };

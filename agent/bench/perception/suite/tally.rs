@@ -58,8 +58,11 @@ pub struct Tally {
     pub hinges: usize,
     /// Right templates of the things that were found.
     pub template: Share,
-    /// Shared volume of the parts of things that were found.
+    /// Shared volume of the parts of things that were found, the frame's common error of place taken off, without what
+    /// colour alone shows.
     pub part_iou: Vec<f64>,
+    /// The same of all of them as they stand in the world.
+    pub world_part_iou: Vec<f64>,
     /// Observed dimensions whose 90 % interval holds the truth.
     pub interval: Share,
     /// Widths of those intervals.
@@ -105,6 +108,7 @@ impl Tally {
             (&mut self.absolute_mm, &other.absolute_mm),
             (&mut self.yaw_deg, &other.yaw_deg),
             (&mut self.part_iou, &other.part_iou),
+            (&mut self.world_part_iou, &other.world_part_iou),
             (&mut self.interval_mm, &other.interval_mm),
             (&mut self.new_ms, &other.new_ms),
             (&mut self.known_ms, &other.known_ms),
@@ -158,6 +162,7 @@ impl Tally {
     /// What became of the things, and what else is counted.
     pub fn counts(&self) -> Vec<(&'static str, f64)> {
         let fates = Fate::ALL.map(|fate| (fate.name(), self.fates.get(&fate).copied().unwrap_or(0) as f64));
+        let parts = self.world_part_iou.len().max(1) as f64;
         let other = [
             ("scenes", self.scenes as f64),
             ("things", self.things() as f64),
@@ -167,6 +172,7 @@ impl Tally {
             ("dimensions_bounded", self.bounded.of as f64),
             ("dimensions_within_bounds", self.bounded.held as f64),
             ("dimensions_unseen", self.unseen as f64),
+            ("part_iou_in_the_world", self.world_part_iou.iter().sum::<f64>() / parts),
         ];
         fates.into_iter().chain(other).collect()
     }
