@@ -3,7 +3,7 @@
 //! | module | holds |
 //! |---|---|
 //! | [`targets`] | floors and goals, and the comparison with them |
-//! | [`perception`] | segmentation of real frames and the time a frame takes |
+//! | [`perception`] | real labelled frames, and the fixed rendered suite with its truth |
 //! | [`runtime`] | frames and messages from one to the other, the trace, restarts |
 //! | [`world`] | physics and pictures beside MuJoCo, grasps and primitives, pace, audit, snapshots |
 
@@ -12,8 +12,9 @@ pub mod runtime;
 pub mod targets;
 pub mod world;
 
-use crate::cli::{BenchArgs, BenchCommand, Exit, WorldArgs};
+use crate::cli::{BenchArgs, BenchCommand, Exit, PerceptionArgs, WorldArgs};
 use anyhow::Context;
+use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use std::{
     collections::BTreeMap,
@@ -139,7 +140,7 @@ impl BenchResult {
 
 /// Runs `acm bench`. It ends with 1 if a figure misses its floor or a part could not be measured.
 pub fn run(command: &BenchCommand) -> anyhow::Result<Exit> {
-    let (BenchCommand::Perception(args)
+    let (BenchCommand::Perception(PerceptionArgs { common: args, .. })
     | BenchCommand::Runtime(args)
     | BenchCommand::World(WorldArgs { common: args, .. })) = command;
     // First, so that a mistake in the file does not cost the measurement.
@@ -148,7 +149,7 @@ pub fn run(command: &BenchCommand) -> anyhow::Result<Exit> {
         None => Targets::own()?,
     };
     let result = match command {
-        BenchCommand::Perception(args) => perception::measure(args),
+        BenchCommand::Perception(args) => perception::measure(args, &targets),
         BenchCommand::Runtime(args) => runtime::measure(args),
         BenchCommand::World(args) => world::measure(args),
     };
@@ -171,6 +172,16 @@ fn write_json(path: &Path, result: &BenchResult) -> anyhow::Result<()> {
     let mut text = serde_json::to_string_pretty(result)?;
     text.push('\n');
     std::fs::write(path, text).with_context(|| format!("the result {} cannot be written", path.display()))
+}
+
+/// A bar on standard error that says how far a part has come.
+fn progress(what: &str, length: u64) -> ProgressBar {
+    let bar = ProgressBar::new(length);
+    let style = ProgressStyle::with_template(&format!("{what} {{bar:30}} {{pos}}/{{len}} {{elapsed}} eta {{eta}}"));
+    match style {
+        Ok(style) => bar.with_style(style),
+        Err(_template) => bar,
+    }
 }
 
 /// A number in at most four figures after the point.

@@ -3,7 +3,12 @@
 pub mod trace;
 
 use crate::{
-    bench, bench::world::WorldPart, demo, doctor, inject::Injection, llm::LlmId, perceive, run, scenario, serve,
+    bench,
+    bench::{perception::PerceptionPart, world::WorldPart},
+    demo, doctor,
+    inject::Injection,
+    llm::LlmId,
+    perceive, run, scenario, serve,
 };
 use acm_actors::{
     AgentError,
@@ -365,8 +370,8 @@ pub fn exit_of_error(error: &anyhow::Error) -> Exit {
 /// The benches.
 #[derive(Debug, Subcommand)]
 pub enum BenchCommand {
-    /// Segmentation of real labelled frames (found through the variable ACM_DATA) and the time a frame takes.
-    Perception(BenchArgs),
+    /// Real labelled frames and foreign meshes (found through the variable ACM_DATA), and rendered tables with their truth.
+    Perception(PerceptionArgs),
     /// Frames between processes, messages between actors, what a trace costs, how fast an actor is replaced.
     Runtime(BenchArgs),
     /// Physics beside MuJoCo, grasps, primitives, rendering, pace, physics audit, snapshots.
@@ -388,6 +393,20 @@ pub struct BenchArgs {
     /// Compare with the targets of this file instead of the built-in ones.
     #[arg(long, value_name = "FILE")]
     pub against: Option<PathBuf>,
+}
+
+/// Arguments of `acm bench perception`.
+#[derive(Debug, Args)]
+pub struct PerceptionArgs {
+    /// What every bench takes.
+    #[command(flatten)]
+    pub common: BenchArgs,
+    /// Measure these parts alone, in this order.
+    #[arg(long, value_name = "PART,...", value_delimiter = ',', value_enum)]
+    pub only: Vec<PerceptionPart>,
+    /// Draw every rendered scene into this folder: what was reported, red outlines of the truth, what became of each thing.
+    #[arg(long, value_name = "DIR")]
+    pub pictures: Option<PathBuf>,
 }
 
 /// Arguments of `acm bench world`.

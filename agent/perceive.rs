@@ -109,7 +109,7 @@ fn save(path: &Path, what: &str, result: image::ImageResult<()>) -> anyhow::Resu
 }
 
 /// There is no robot in front of a photograph.
-fn no_robot(header: &FrameHeader) -> Feedback {
+pub(crate) fn no_robot(header: &FrameHeader) -> Feedback {
     Feedback {
         time: header.time,
         tcp: Pose::IDENTITY,

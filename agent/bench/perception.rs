@@ -1,143 +1,57 @@
-//! `acm bench perception`: real labelled frames are cut into objects and compared with the hand labels.
+//! `acm bench perception`: what perception makes of real and of rendered frames, against labels and truth.
+//!
+//! | module | measures |
+//! |---|---|
+//! | [`real_frames`] | segmentation of labelled frames of a real camera |
+//! | [`suite`] | the fixed rendered suite: things found, their templates, sizes, places, and time |
 
-use super::{BenchResult, Row};
-use crate::{cli::BenchArgs, perceive::input, statistics::median_and};
-use acm_concept::{camera::RgbdFrame, expectation::Expectation, ids::FrameId, object::Percepts, time::Time};
-use acm_perception::{Grounder, GrounderConfig, frames, labels, metrics};
-use anyhow::{Context, bail};
-use serde::Deserialize;
-use std::{
-    collections::BTreeMap,
-    path::{Path, PathBuf},
-    sync::Arc,
-    time::Instant,
-};
+pub mod real_frames;
+pub mod suite;
 
-/// Where the frames lie in the folder of outside data.
-const FRAMES: &str = "rgbd_mosd/frames";
-/// The figures of this bench.
-const FIGURES: [&str; 4] = ["mosd_overlap_f", "mosd_boundary_f", "mosd_objects_over_075", "frame_new_ms"];
+use super::{BenchResult, targets::Targets};
+use crate::cli::PerceptionArgs;
+use acm_concept::{camera::RgbdFrame, expectation::Expectation, object::Percepts};
+use acm_perception::Grounder;
+use clap::ValueEnum;
+use std::time::Instant;
 
-/// What the data says of itself.
-#[derive(Debug, Deserialize)]
-struct Index {
-    intrinsics: Calibration,
-    depth_unit_m: f64,
-    frames: Vec<Described>,
+/// A part of the bench.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum PerceptionPart {
+    /// Labelled frames of a real camera.
+    RealFrames,
+    /// The fixed rendered suite: exact, perturbed and foreign things.
+    Suite,
+    /// Small cubes in small frames.
+    SmallCubes,
 }
 
-#[derive(Debug, Deserialize)]
-struct Calibration {
-    fx: f64,
-    fy: f64,
-    cx: f64,
-    cy: f64,
-}
-
-#[derive(Debug, Deserialize)]
-struct Described {
-    index: u32,
-    group: String,
-}
-
-/// Measures. Without the outside data its rows say that they were skipped.
-pub fn measure(args: &BenchArgs) -> anyhow::Result<BenchResult> {
-    let mut result = BenchResult::new("perception", "kinect (real frames)");
-    let data = std::env::var_os("ACM_DATA").map(PathBuf::from);
-    let Some(folder) = data.map(|data| data.join(FRAMES)).filter(|folder| folder.is_dir()) else {
-        let reason = format!("no data: the variable ACM_DATA names no folder that holds {FRAMES}");
-        result.rows = FIGURES.iter().map(|name| Row::skipped(*name, &reason)).collect();
-        return Ok(result);
-    };
-    let described = describe(&folder)?;
-    let mut pairs = input::pairs_in(&folder)?;
-    pairs.truncate(args.episodes.unwrap_or(usize::MAX));
-    let grounder = Grounder::new(Arc::new(acm_memory::default_library()?), GrounderConfig::default());
-    for (number, pair) in pairs.iter().enumerate() {
-        let calibration = &described.intrinsics;
-        let intrinsics = (calibration.fx, calibration.fy, calibration.cx, calibration.cy);
-        let id = FrameId(number as u64);
-        let frame =
-            frames::read_pair(&pair.color, &pair.depth, intrinsics, described.depth_unit_m, None, id, Time::ZERO)?;
-        if number == 0 {
-            // Tables are built at the first call.
-            grounder.ground(&frame, &Expectation::default());
+/// Measures the parts that are asked for, or everything.
+///
+/// # Errors
+/// None: a part that ends with an error is told in the result.
+pub fn measure(args: &PerceptionArgs, targets: &Targets) -> anyhow::Result<BenchResult> {
+    let mut result = BenchResult::new("perception", "d435; kinect (real frames)");
+    let parts = if args.only.is_empty() { PerceptionPart::value_variants() } else { &args.only };
+    for part in parts {
+        let measured = match part {
+            PerceptionPart::RealFrames => real_frames::measure(&args.common, &mut result),
+            PerceptionPart::Suite => suite::measure(args, targets, &mut result),
+            PerceptionPart::SmallCubes => suite::measure_small_cubes(args, &mut result),
+        };
+        // What the other parts have measured is not lost with it.
+        if let Err(error) = measured {
+            let name = part.to_possible_value().map(|value| value.get_name().to_string()).unwrap_or_default();
+            result.errors.push(format!("{name}: {error:#}"));
         }
-        let (percepts, took_ms) = timed(&grounder, &frame);
-        let truth = truth(&folder.join(format!("{}_label.png", pair.stem)), &frame)?;
-        let width = frame.header.intrinsics.width as usize;
-        let score = metrics::score(&labels::draw(&percepts).into_raw(), &truth, width);
-        let values = [
-            ("overlap_f", score.overlap_f),
-            ("boundary_f", score.boundary_f),
-            ("objects_over_075", (score.share_over_75 * score.truth as f64).round()),
-            ("objects", score.truth as f64),
-            ("found", score.predicted as f64),
-            ("ms", took_ms),
-        ];
-        let group = described.frames.iter().find(|d| pair.stem.parse() == Ok(d.index)).map(|d| d.group.clone());
-        result.rows.push(Row { group, ..Row::new(pair.stem.clone(), values) });
     }
-    summarise(&mut result);
     Ok(result)
 }
 
-/// The means over all frames, and for each group.
-fn summarise(result: &mut BenchResult) {
-    let mut groups: BTreeMap<String, Vec<&Row>> = BTreeMap::new();
-    for row in &result.rows {
-        groups.entry(row.group.clone().unwrap_or_else(|| "other".into())).or_default().push(row);
-    }
-    let mut summary: Vec<Row> = Vec::new();
-    for (group, rows) in groups {
-        let means = means(&rows);
-        summary.push(Row { group: Some(group), ..Row::new("mean", FIGURES.into_iter().zip(means)) });
-    }
-    let all: Vec<&Row> = result.rows.iter().collect();
-    let figures = means(&all);
-    for (name, value) in FIGURES.into_iter().zip(figures) {
-        result.figure(name, value);
-    }
-    result.rows.extend(summary);
-}
-
-/// In the order of [`FIGURES`]: mean overlap F and boundary F of the frames, share of all their objects over 0.75, median
-/// time.
-fn means(rows: &[&Row]) -> [f64; 4] {
-    let column = |name: &str| -> Vec<f64> { rows.iter().filter_map(|row| row.values.get(name).copied()).collect() };
-    let sum = |name: &str| column(name).iter().sum::<f64>();
-    let frames = rows.len().max(1) as f64;
-    let (median_ms, _) = median_and(0.5, &column("ms"));
-    [
-        sum("overlap_f") / frames,
-        sum("boundary_f") / frames,
-        sum("objects_over_075") / sum("objects").max(1.0),
-        median_ms,
-    ]
-}
-
-/// Grounds a frame of which nothing is known, and says how long it took, milliseconds.
+/// Grounds a frame, and says how long it took, milliseconds.
 #[allow(clippy::disallowed_methods)] // The time is what is measured.
-fn timed(grounder: &Grounder, frame: &RgbdFrame) -> (Percepts, f64) {
+fn timed(grounder: &Grounder, frame: &RgbdFrame, expectation: &Expectation) -> (Percepts, f64) {
     let started = Instant::now();
-    let percepts = grounder.ground(frame, &Expectation::default());
+    let percepts = grounder.ground(frame, expectation);
     (percepts, started.elapsed().as_secs_f64() * 1e3)
-}
-
-fn describe(folder: &Path) -> anyhow::Result<Index> {
-    let path = folder.with_file_name("index.json");
-    let text = std::fs::read_to_string(&path).with_context(|| format!("{} cannot be read", path.display()))?;
-    serde_json::from_str(&text).with_context(|| format!("{} cannot be understood", path.display()))
-}
-
-/// Hand labels as object numbers: below 20 is the table or nothing, the second digit marks pieces of one object.
-fn truth(path: &Path, frame: &RgbdFrame) -> anyhow::Result<Vec<u16>> {
-    let image =
-        image::open(path).with_context(|| format!("the labels {} cannot be read", path.display()))?.into_luma8();
-    let intrinsics = frame.header.intrinsics;
-    if image.dimensions() != (intrinsics.width, intrinsics.height) {
-        bail!("the labels {} have another size than their frame", path.display());
-    }
-    let object = |label: u8| if label < 20 { 0 } else { u16::from(label) / 10 };
-    Ok(image.into_raw().into_iter().map(object).collect())
 }

@@ -42,6 +42,11 @@ impl Verdict {
 }
 
 impl Target {
+    /// Floors and goals from below `factor` times as high, goals from above as much higher.
+    pub fn loosened(&self, factor: f64) -> Target {
+        let below = |bound: Option<f64>| bound.map(|bound| bound * factor);
+        Target { must: below(self.must), min: below(self.min), max: self.max.map(|bound| bound / factor) }
+    }
     /// Compares a figure with the target. A number that is none reaches nothing.
     pub fn verdict(&self, value: f64) -> Verdict {
         let holds = |bound: Option<f64>, test: fn(f64, f64) -> bool| bound.is_none_or(|bound| test(value, bound));

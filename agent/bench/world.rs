@@ -27,10 +27,9 @@ pub mod primitives;
 pub mod rendering;
 pub mod snapshots;
 
-use super::BenchResult;
+use super::{BenchResult, progress};
 use crate::cli::{BenchArgs, WorldArgs};
 use clap::ValueEnum;
-use indicatif::{ProgressBar, ProgressStyle};
 
 /// A part of the bench: what one module measures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -90,14 +89,4 @@ pub fn measure(args: &WorldArgs) -> anyhow::Result<BenchResult> {
 fn audited(result: &mut BenchResult, violations: u64) {
     let sum = result.figures.get("audit_violations").copied().unwrap_or(0.0) + violations as f64;
     result.figure("audit_violations", sum);
-}
-
-/// A bar on standard error that says how far a part has come.
-fn progress(what: &str, length: u64) -> ProgressBar {
-    let bar = ProgressBar::new(length);
-    let style = ProgressStyle::with_template(&format!("{what} {{bar:30}} {{pos}}/{{len}} {{elapsed}} eta {{eta}}"));
-    match style {
-        Ok(style) => bar.with_style(style),
-        Err(_template) => bar,
-    }
 }

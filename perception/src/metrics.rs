@@ -32,35 +32,59 @@ pub struct SegmentationScore {
 /// ```
 pub fn score(predicted: &[u16], truth: &[u16], width: usize) -> SegmentationScore {
     let length = predicted.len().min(truth.len());
-    let (predicted_px, truth_px) = (by_label(&predicted[..length]), by_label(&truth[..length]));
+    let (predicted, truth) = (&predicted[..length], &truth[..length]);
+    let (predicted_px, truth_px) = (by_label(predicted), by_label(truth));
+    let matched = matches(predicted, truth);
+    let hits: usize = matched.iter().map(|pair| pair.common_px).sum();
+    let count = |px: &BTreeMap<u16, Vec<usize>>| px.values().map(Vec::len).sum::<usize>();
+    let over_75 = matched.iter().filter(|pair| pair.f > 0.75).count();
+    let pairs: Vec<(u16, u16)> = matched.iter().map(|pair| (pair.predicted, pair.truth)).collect();
+    SegmentationScore {
+        overlap_f: 2.0 * hits as f64 / (count(&predicted_px) + count(&truth_px)).max(1) as f64,
+        boundary_f: boundary_f(predicted, truth, width, &pairs),
+        share_over_75: over_75 as f64 / truth_px.len().max(1) as f64,
+        truth: truth_px.len(),
+        predicted: predicted_px.len(),
+    }
+}
+
+/// A true object and the predicted one that it is matched with.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Match {
+    /// Label of the true object.
+    pub truth: u16,
+    /// Label of the predicted one.
+    pub predicted: u16,
+    /// Pixels that both have; never 0.
+    pub common_px: usize,
+    /// F over their pixels, 0-1.
+    pub f: f64,
+}
+
+/// The one-to-one matching of two label images, 0 for background, that makes the sum of the objects' F largest, in the
+/// order of the true labels. What is alone does not appear.
+///
+/// ```
+/// let found = acm_perception::metrics::matches(&[0, 7, 7, 0, 0, 2], &[0, 1, 1, 0, 2, 2]);
+/// assert_eq!((found[0].truth, found[0].predicted, found[0].f), (1, 7, 1.0));
+/// assert!((found[1].f - 2.0 / 3.0).abs() < 1e-9);
+/// ```
+pub fn matches(predicted: &[u16], truth: &[u16]) -> Vec<Match> {
+    let (predicted_px, truth_px) = (by_label(predicted), by_label(truth));
     let mut common: BTreeMap<(u16, u16), usize> = BTreeMap::new();
     for (&p, &t) in predicted.iter().zip(truth).filter(|(p, t)| **p != 0 && **t != 0) {
         *common.entry((p, t)).or_insert(0) += 1;
     }
-    let (p_labels, t_labels): (Vec<u16>, Vec<u16>) =
-        (predicted_px.keys().copied().collect(), truth_px.keys().copied().collect());
-    let shared = |p: u16, t: u16| common.get(&(p, t)).copied().unwrap_or(0);
-    let f_of = |p: u16, t: u16| {
+    let pair = |t: u16, p: u16| {
+        let common_px = common.get(&(p, t)).copied().unwrap_or(0);
         let sizes = predicted_px.get(&p).map_or(0, Vec::len) + truth_px.get(&t).map_or(0, Vec::len);
-        2.0 * shared(p, t) as f64 / sizes.max(1) as f64
+        Match { truth: t, predicted: p, common_px, f: 2.0 * common_px as f64 / sizes.max(1) as f64 }
     };
-    let gains: Vec<Vec<f64>> = t_labels.iter().map(|&t| p_labels.iter().map(|&p| f_of(p, t)).collect()).collect();
-    let matched: Vec<(u16, u16)> = assign(&gains)
-        .into_iter()
-        .enumerate()
-        .filter_map(|(t, p)| p.map(|p| (p_labels[p], t_labels[t])))
-        .filter(|&(p, t)| shared(p, t) > 0)
-        .collect();
-    let hits: usize = matched.iter().map(|&(p, t)| shared(p, t)).sum();
-    let count = |px: &BTreeMap<u16, Vec<usize>>| px.values().map(Vec::len).sum::<usize>();
-    let over_75 = matched.iter().filter(|&&(p, t)| f_of(p, t) > 0.75).count();
-    SegmentationScore {
-        overlap_f: 2.0 * hits as f64 / (count(&predicted_px) + count(&truth_px)).max(1) as f64,
-        boundary_f: boundary_f(&predicted[..length], &truth[..length], width, &matched),
-        share_over_75: over_75 as f64 / t_labels.len().max(1) as f64,
-        truth: t_labels.len(),
-        predicted: p_labels.len(),
-    }
+    let p_labels: Vec<u16> = predicted_px.keys().copied().collect();
+    let t_labels: Vec<u16> = truth_px.keys().copied().collect();
+    let gains: Vec<Vec<f64>> = t_labels.iter().map(|&t| p_labels.iter().map(|&p| pair(t, p).f).collect()).collect();
+    let matched = assign(&gains).into_iter().zip(t_labels);
+    matched.filter_map(|(p, t)| Some(pair(t, p_labels[p?]))).filter(|pair| pair.common_px > 0).collect()
 }
 
 fn by_label(labels: &[u16]) -> BTreeMap<u16, Vec<usize>> {

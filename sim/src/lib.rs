@@ -14,6 +14,7 @@
 //! | `oracle`, `state` | the judge and its variables |
 //! | `audit` | whether whatever happened had a cause |
 //! | `snapshot` | all of it as bytes, and back |
+//! | `surfaces` | what a foreign object looks like, without a world |
 //! | `episode`, `scene`, `texture`, `truth`, `report` | the handles, the picture, the truth, what is reported |
 //!
 //! Conventions: metres, seconds, newtons; world frame with z up; an object's base frame is the middle of its bottom.
@@ -44,6 +45,7 @@ mod scene;
 mod shared_data;
 mod snapshot;
 mod state;
+mod surfaces;
 #[cfg(test)]
 mod testbed;
 mod texture;
@@ -61,4 +63,5 @@ pub use report::{Preview, SimError, SimOptions, SimTimings};
 pub use robot::RobotError;
 pub use scenario::{MAX_SCENARIO_BYTES, Scenario, ScenarioError, Setting};
 pub use snapshot::{Snapshot, SnapshotError};
+pub use surfaces::{Surface, SurfacesError, surfaces};
 pub use truth::{TrueJoint, TrueLink, TrueObject, TruePiece, TrueShape};

@@ -174,7 +174,7 @@ const BALL_RINGS: u32 = 16;
 const BALL_SEGMENTS: u32 = 32;
 
 /// A ball of radius 1 about the origin.
-fn unit_ball() -> Result<Mesh, MeshError> {
+pub(crate) fn unit_ball() -> Result<Mesh, MeshError> {
     let point = |ring: u32, step: u32| {
         let (across, up) = (ring as f32 / BALL_RINGS as f32 * std::f32::consts::PI).sin_cos();
         let (sine, cosine) = (step as f32 / BALL_SEGMENTS as f32 * std::f32::consts::TAU).sin_cos();

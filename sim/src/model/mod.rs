@@ -257,7 +257,7 @@ impl ModelLibrary {
         if let Some(known) = self.models.get(&key) {
             return Ok(known.clone());
         }
-        let loaded = Arc::new(load::load(name, folder)?);
+        let loaded = Arc::new(load::load(name, folder, load::Wanted::Whole)?);
         self.models.insert(key, loaded.clone());
         Ok(loaded)
     }

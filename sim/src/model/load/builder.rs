@@ -1,7 +1,7 @@
 //! Puts loaded links together: everything in one frame, which stands in the middle below the object.
 
 use super::{
-    convex,
+    Wanted, convex,
     mesh::{self, Triangles},
     plain_name,
 };
@@ -50,6 +50,7 @@ pub(super) enum Use {
 
 #[derive(Debug, Default)]
 pub(super) struct Builder {
+    wanted: Wanted,
     links: Vec<Link>,
     originals: Vec<Option<Original>>,
     masses: Vec<Option<f64>>,
@@ -59,6 +60,10 @@ pub(super) struct Builder {
 }
 
 impl Builder {
+    pub(super) fn of(wanted: Wanted) -> Builder {
+        Builder { wanted, ..Builder::default() }
+    }
+
     pub(super) fn warn(&mut self, warning: impl Into<String>) {
         let warning = warning.into();
         if !self.warnings.contains(&warning) {
@@ -165,7 +170,7 @@ impl Builder {
                 Err(problem) => self.warn(problem.to_string()),
             }
         }
-        if used != Use::Seen {
+        if used != Use::Seen && self.wanted == Wanted::Whole {
             let hulls = convex::decompose(&placed);
             made.extend(hulls.into_iter().map(|hull| (Shape::Hull(hull), Pose::IDENTITY, Use::Felt)));
         }
@@ -175,7 +180,7 @@ impl Builder {
     /// The object, standing on its base frame, with weights put right.
     pub(super) fn finish(mut self, summary: String, fixed: bool) -> Result<ObjectModel, String> {
         let pieces = || self.links.iter().flat_map(|link| &link.pieces);
-        if !pieces().any(|piece| piece.solid) {
+        if self.wanted == Wanted::Whole && !pieces().any(|piece| piece.solid) {
             return Err("has nothing that could be touched".into());
         }
         let all = pieces().map(|piece| piece.bounds(&Pose::IDENTITY));

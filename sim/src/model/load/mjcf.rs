@@ -1,6 +1,7 @@
 //! MJCF files, leniently: what is missing or cannot be shown is left out with a warning.
 
 use super::{
+    Wanted,
     builder::{Builder, Form, Use},
     tidy,
 };
@@ -29,9 +30,9 @@ const MAX_EXPANDED_BYTES: usize = 8 * 1024 * 1024;
 const DENSITY: f64 = 1000.0;
 
 /// Reads the whole world, or one of its bodies with all that hangs on it.
-pub(super) fn read(path: &Path, text: &str, part: Option<&str>) -> Result<ObjectModel, String> {
+pub(super) fn read(path: &Path, text: &str, part: Option<&str>, wanted: Wanted) -> Result<ObjectModel, String> {
     let folder = path.parent().unwrap_or(Path::new(""));
-    let mut builder = Builder::default();
+    let mut builder = Builder::of(wanted);
     let mut includes = Includes { main: folder, files: 0, builder: &mut builder };
     let expanded = includes.expand(text, folder, &mut Vec::new())?;
     let model = Model::from_str(&expanded, folder).map_err(|e| e.to_string().replace('\n', " "))?;

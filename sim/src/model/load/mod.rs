@@ -20,12 +20,22 @@ const DATA_VARIABLE: &str = "ACM_DATA";
 /// Largest model file that is read, bytes.
 const MAX_BYTES: u64 = 4 * 1024 * 1024;
 
+/// What of an object is wanted.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) enum Wanted {
+    /// What is seen and what is felt.
+    #[default]
+    Whole,
+    /// What is seen alone: meshes are not cut into convex bodies, which takes long.
+    Surfaces,
+}
+
 /// Reads `NAME`, a path relative to `folder`, or relative to the data folder with `data:` before it. An MJCF file can
 /// be followed by `#BODY` for one of its bodies.
 ///
 /// # Errors
 /// One line with the file and what of it is wrong.
-pub(crate) fn load(name: &str, folder: &Path) -> Result<ObjectModel, String> {
+pub(crate) fn load(name: &str, folder: &Path, wanted: Wanted) -> Result<ObjectModel, String> {
     let (path, part) = match name.split_once('#') {
         Some((path, part)) => (path, Some(part)),
         None => (name, None),
@@ -36,8 +46,8 @@ pub(crate) fn load(name: &str, folder: &Path) -> Result<ObjectModel, String> {
         Some("urdf") if part.is_some() => {
             Err("a URDF file has no bodies to choose from; leave out what follows `#`".into())
         }
-        Some("urdf") => urdf::read(&path, &text),
-        Some("xml" | "mjcf") => mjcf::read(&path, &text, part),
+        Some("urdf") => urdf::read(&path, &text, wanted),
+        Some("xml" | "mjcf") => mjcf::read(&path, &text, part, wanted),
         _ => Err("ends neither in .urdf nor in .xml or .mjcf".into()),
     };
     let model = loaded.map_err(|reason| format!("{}: {reason}", path.display()))?;

@@ -6,7 +6,7 @@ use glam::DVec3;
 fn load_text(name: &str, text: &str) -> Result<ObjectModel, String> {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join(name), text).unwrap();
-    load(name, folder.path())
+    load(name, folder.path(), Wanted::Whole)
 }
 
 const CABINET: &str = r#"<robot name="cabinet">
@@ -90,7 +90,7 @@ fn a_body_of_an_mjcf_file_becomes_an_object_whatever_is_missing() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("kitchen.xml"), KITCHEN).unwrap();
     std::fs::write(folder.path().join("door.xml"), DOOR).unwrap();
-    let model = load("kitchen.xml#microwave", folder.path()).unwrap();
+    let model = load("kitchen.xml#microwave", folder.path(), Wanted::Whole).unwrap();
     assert!(model.fixed);
     let names: Vec<&str> = model.links.iter().map(|link| link.name.as_str()).collect();
     assert_eq!(names, ["base", "swing", "turn", "glow"]);
@@ -106,11 +106,11 @@ fn a_body_of_an_mjcf_file_becomes_an_object_whatever_is_missing() {
         panic!("{:?}", model.links[3]);
     };
     assert!((ratio - 1.0 / 174.0).abs() < 1e-9);
-    assert!(!load("kitchen.xml#cup", folder.path()).unwrap().fixed);
-    let error = load("kitchen.xml#oven", folder.path()).unwrap_err();
+    assert!(!load("kitchen.xml#cup", folder.path(), Wanted::Whole).unwrap().fixed);
+    let error = load("kitchen.xml#oven", folder.path(), Wanted::Whole).unwrap_err();
     assert!(error.contains("no body `oven`") && error.contains("microwave"), "{error}");
     std::fs::write(folder.path().join("nowhere.xml"), "<mujoco><include file='nowhere.xml'/></mujoco>").unwrap();
-    assert!(load("kitchen.xml", folder.path()).unwrap_err().contains("includes itself"));
+    assert!(load("kitchen.xml", folder.path(), Wanted::Whole).unwrap_err().contains("includes itself"));
 }
 
 #[test]
@@ -128,7 +128,7 @@ fn bad_files_are_one_line_with_the_file() {
         let error = load_text(name, &text).unwrap_err();
         assert!(error.contains(expected) && error.contains(name) && !error.contains('\n'), "{error}");
     }
-    assert!(load("b.urdf", Path::new("/nowhere")).unwrap_err().contains("cannot be read"));
+    assert!(load("b.urdf", Path::new("/nowhere"), Wanted::Whole).unwrap_err().contains("cannot be read"));
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! URDF files, as exporters really write them.
 
 use super::{
+    Wanted,
     builder::{Builder, Form, Use},
     tidy,
 };
@@ -21,8 +22,8 @@ use urdf_rs::{Geometry, JointType, Robot};
 /// What a slider without a range is given, metres.
 const UNNAMED_RANGE_M: [f64; 2] = [-0.5, 0.5];
 
-pub(super) fn read(path: &Path, text: &str) -> Result<ObjectModel, String> {
-    let mut builder = Builder::default();
+pub(super) fn read(path: &Path, text: &str, wanted: Wanted) -> Result<ObjectModel, String> {
+    let mut builder = Builder::of(wanted);
     let (text, masses) = mended(text, &mut builder)?;
     let robot = urdf_rs::read_from_string(&text).map_err(|e| e.to_string().replace('\n', " "))?;
     let folder = path.parent().unwrap_or(Path::new(""));

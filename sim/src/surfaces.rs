@@ -1,0 +1,77 @@
+//! What a foreign object looks like: its seen surfaces alone, without a world, for benches that only draw.
+
+use crate::{
+    model::{
+        self,
+        load::{self, Wanted},
+        shape::Shape,
+    },
+    scene,
+};
+use acm_concept::{pose::Pose, solid::Solid};
+use acm_render::{Mesh, MeshError};
+use glam::DVec3;
+use std::{path::Path, sync::Arc};
+use thiserror::Error;
+
+/// A seen surface of an object whose joints all stand at their start.
+#[derive(Debug, Clone)]
+pub struct Surface {
+    /// The triangles.
+    pub mesh: Arc<Mesh>,
+    /// Factors along the mesh's own axes, applied before the pose.
+    pub scale: DVec3,
+    /// Pose of the mesh in the object's base frame, which is the middle of the bottom of its bounding box, z up. Metres.
+    pub pose: Pose,
+    /// 8-bit sRGB.
+    pub color: [u8; 3],
+}
+
+/// Why the surfaces of an object cannot be had.
+#[derive(Debug, Error)]
+pub enum SurfacesError {
+    /// The file cannot be read, or makes no sense.
+    #[error("object {0}")]
+    Load(String),
+    /// A plain shape cannot be drawn.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+    /// Nothing of it is seen.
+    #[error("object {0} has nothing that could be seen")]
+    Empty(String),
+}
+
+/// The seen surfaces of an object of a URDF or MJCF file, named as a scenario's `model_file` names it.
+///
+/// # Errors
+/// One line with the file and what of it is wrong.
+pub fn surfaces(model_file: &str) -> Result<Vec<Surface>, SurfacesError> {
+    let object = load::load(model_file, Path::new(""), Wanted::Surfaces).map_err(SurfacesError::Load)?;
+    let links = model::poses(&object.links, |_, joint| joint.start);
+    let mut found = Vec::new();
+    for (link, at) in object.links.iter().zip(links) {
+        for piece in link.pieces.iter().filter(|piece| piece.shown) {
+            let pose = at * piece.pose;
+            let mut add = |mesh: Arc<Mesh>, pose: Pose, scale: DVec3| {
+                found.push(Surface { mesh, scale, pose, color: piece.color });
+            };
+            match &piece.shape {
+                Shape::Solid(Solid::Box { size }) => add(Arc::new(Mesh::unit_box()), pose, *size),
+                Shape::Solid(Solid::Cylinder { radius, height }) => {
+                    add(Arc::new(Mesh::unit_cylinder()), pose, DVec3::new(*radius, *radius, *height));
+                }
+                Shape::Capsule { radius, height } => {
+                    add(Arc::new(Mesh::unit_cylinder()), pose, DVec3::new(*radius, *radius, *height));
+                    for end in [-0.5, 0.5] {
+                        let end = pose * Pose::from_translation(DVec3::Z * (end * height));
+                        add(Arc::new(scene::unit_ball()?), end, DVec3::splat(*radius));
+                    }
+                }
+                Shape::Ball { radius } => add(Arc::new(scene::unit_ball()?), pose, DVec3::splat(*radius)),
+                Shape::Surface { mesh, scale } => add(mesh.clone(), pose, *scale),
+                Shape::Hull(_) => {}
+            }
+        }
+    }
+    if found.is_empty() { Err(SurfacesError::Empty(model_file.into())) } else { Ok(found) }
+}
