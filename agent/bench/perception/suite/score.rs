@@ -106,7 +106,7 @@ pub fn score(scene: &Scene, truth: &[u16], percepts: &Percepts, library: &Templa
     tally.reported = percepts.objects.len();
     tally.false_objects = percepts.objects.len() - matched.iter().filter(|pair| pair.f > FALSE_F).count();
     let mut places = Vec::new();
-    let bias = bias(scene, &matched, percepts);
+    let errors = place_errors(scene, &matched, percepts);
     for (at, thing) in scene.things.iter().enumerate() {
         let label = at as u16 + 1;
         if let Some(template) = thing.template.as_ref().and_then(|truth| library.get(&truth.template)) {
@@ -126,7 +126,7 @@ pub fn score(scene: &Scene, truth: &[u16], percepts: &Percepts, library: &Templa
                     }
                     tally.all_places.push((pose.pose.translation, thing.pose.translation));
                 }
-                compare(thing, object, library, bias, tally)
+                compare(thing, object, library, common_error(&errors, label), tally)
             }
             None => lost(label, &reported, truth, &matched),
         };
@@ -139,16 +139,24 @@ pub fn score(scene: &Scene, truth: &[u16], percepts: &Percepts, library: &Templa
     scored
 }
 
-/// What all places of a frame have in common that are found: the error of the camera's calibration, world frame, metres.
-/// The middle one, so that a thing that is itself off does not move it.
-fn bias(scene: &Scene, matched: &[Match], percepts: &Percepts) -> DVec3 {
-    let offset = |pair: &Match| {
+/// By how much each found thing, by its label, is not where it is said to be: world frame, metres.
+fn place_errors(scene: &Scene, matched: &[Match], percepts: &Percepts) -> Vec<(u16, DVec3)> {
+    let error = |pair: &Match| {
         let thing = scene.things.get(usize::from(pair.truth).checked_sub(1)?)?;
         let object = percepts.objects.get(usize::from(pair.predicted).checked_sub(1)?)?;
-        Some(object.pose()?.pose.translation - thing.pose.translation)
+        Some((pair.truth, object.pose()?.pose.translation - thing.pose.translation))
     };
-    let offsets: Vec<DVec3> = matched.iter().filter(|pair| pair.f > FOUND_F).filter_map(offset).collect();
-    let middle = |axis: usize| median_and(0.5, &offsets.iter().map(|offset| offset[axis]).collect::<Vec<_>>()).0;
+    matched.iter().filter(|pair| pair.f > FOUND_F).filter_map(error).collect()
+}
+
+/// The middle of the errors of all other things: that of the camera's calibration, as far as it can be told. Without
+/// others nothing is taken off.
+fn common_error(errors: &[(u16, DVec3)], label: u16) -> DVec3 {
+    let others: Vec<DVec3> = errors.iter().filter(|(of, _)| *of != label).map(|(_, error)| *error).collect();
+    if others.is_empty() {
+        return DVec3::ZERO;
+    }
+    let middle = |axis: usize| median_and(0.5, &others.iter().map(|error| error[axis]).collect::<Vec<_>>()).0;
     DVec3::new(middle(0), middle(1), middle(2))
 }
 
