@@ -18,6 +18,9 @@ const MAX_JOINS: usize = 24;
 const SAME_TINT: f32 = 12.0;
 /// Parts of one thing that do not touch in the image are nearer to each other than this.
 const NEAR_M: f64 = 0.02;
+/// Share of a fringe's outline along which the thing cuts it off, and of its pixels that are two from its border.
+const FRINGE_CUT: f64 = 0.3;
+const FRINGE_THICK: f64 = 0.1;
 /// Tops of pieces of one thing are level within this.
 const LEVEL_M: f64 = 0.016;
 
@@ -124,7 +127,7 @@ fn related(
                 continue;
             }
             let holds = match relation {
-                Relation::Artefact => is_ramp_of(a, b),
+                Relation::Artefact => is_ramp_of(a, b) || is_fringe_of(scene, a, b),
                 Relation::Floor => is_floor_of(a, b),
                 Relation::Surface => is_fragment_of(scene, a, b),
                 Relation::Inside => is_inside_of(scene, segments, context, a, b),
@@ -144,6 +147,20 @@ fn related(
 fn is_ramp_of(whole: &Piece, ramp: &Piece) -> bool {
     let touches = ramp.evidence.border_share(whole.label, &[OutlineKind::Contact, OutlineKind::Cut]);
     touches > 0.2 && ramp.top_m < 0.014_f64.min(0.3 * whole.top_m) && ramp.pixels.len() * 10 < whole.pixels.len()
+}
+
+/// Whether `fringe` is the band of depths between a thing and what is behind it that a depth camera draws along an edge:
+/// nowhere thick, and cut off by the thing along one side.
+fn is_fringe_of(scene: &Scene, whole: &Piece, fringe: &Piece) -> bool {
+    if fringe.pixels.len() * 10 > whole.pixels.len()
+        || fringe.evidence.border_share(whole.label, &[OutlineKind::Cut]) < FRINGE_CUT
+    {
+        return false;
+    }
+    let mut mask = vec![false; scene.grid.len()];
+    fringe.pixels.iter().for_each(|&pixel| mask[pixel] = true);
+    let thick = scene.grid.erode(&mask, 2).into_iter().filter(|inside| *inside).count();
+    (thick as f64) < FRINGE_THICK * fringe.pixels.len() as f64
 }
 
 /// Whether `floor` lies within `outer`: bordered by it nearly all round, by nothing farther, and lower.
