@@ -305,6 +305,8 @@ fn score(context: Context, model: &Model, minimum: &Minimum, evidence: &Evidence
 
 /// A residual up to this many standard deviations counts as explained.
 const EXPLAINED: f64 = 3.0;
+/// So is an outline point up to this many pixels, however sharp the edge.
+const EXPLAINED_PX: f64 = 4.5;
 
 impl Hypothesis<'_> {
     /// Share of the evidence that the fit explains: of the surface points, and of the outline points that are the
@@ -315,13 +317,13 @@ impl Hypothesis<'_> {
         let (points, outline) = residuals.split_at(evidence.points.len().min(residuals.len()));
         let share = |good: usize, all: usize| if all == 0 { 1.0 } else { good as f64 / all as f64 };
         let fits = |r: &&f64| r.abs() < EXPLAINED;
-        let own: Vec<f64> = outline
+        let own: Vec<bool> = outline
             .iter()
             .zip(&evidence.outline)
             .filter(|(_, p)| p.kind == OutlineKind::Own)
-            .map(|(r, _)| *r)
+            .map(|(r, p)| r.abs() < EXPLAINED.max(EXPLAINED_PX / p.sigma_px))
             .collect();
-        (share(points.iter().filter(fits).count(), points.len()), share(own.iter().filter(fits).count(), own.len()))
+        (share(points.iter().filter(fits).count(), points.len()), share(own.iter().filter(|fits| **fits).count(), own.len()))
     }
 }
 
