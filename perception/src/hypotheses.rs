@@ -12,7 +12,7 @@ use crate::{
 use acm_concept::{
     object::GroundedPart,
     pose::Pose,
-    template::{Rest, SeenBy, Template, TemplateLibrary},
+    template::{Rest, SeenBy, Template, TemplateLibrary, Unit},
 };
 use glam::{DQuat, DVec2, DVec3, Vec2Swizzles};
 use nalgebra::DMatrix;
@@ -72,6 +72,8 @@ const HOPELESS_COST: f64 = 25.0;
 /// dropped.
 const FORLORN_FACTOR: f64 = 4.0;
 const FORLORN_COST: f64 = 100.0;
+/// Shares of its range at which a hinge is tried.
+const OPENED: [f64; 2] = [0.25, 0.65];
 /// Starts that are fitted of each template.
 const STARTS: usize = 2;
 
@@ -167,12 +169,16 @@ impl<'a> Starts<'a> {
                 None => [rectangle.length, rectangle.width, height_m, radius],
                 Some(rest) => upright_measures(rest, along.extend(height_m)),
             };
-            let model = Model::new(template, template.initial_values(measures).ok()?, measured.base)?.lying(rest);
-            let at = if model.turns { rectangle.centre } else { centre };
+            let values = template.initial_values(measures).map_or(Vec::new(), |initial| opened(template, initial));
             // The measures are along the longer side, or across it.
             let quarter = if along.x < along.y { FRAC_PI_2 } else { 0.0 };
-            let start = model.start(at, rectangle.yaw + quarter);
-            Some((model, start))
+            let started = move |values: Vec<f64>| {
+                let model = Model::new(template, values, measured.base)?.lying(rest);
+                let at = if model.turns { rectangle.centre } else { centre };
+                let start = model.start(at, rectangle.yaw + quarter);
+                Some((model, start))
+            };
+            values.into_iter().filter_map(started).collect::<Vec<_>>()
         };
         // In another rest either side of the rectangle may be the part's own height.
         let ways = |rectangle| {
@@ -180,12 +186,12 @@ impl<'a> Starts<'a> {
             let across = rest.map(|_| (rectangle, sides(rectangle).yx()));
             std::iter::once((rectangle, sides(rectangle))).chain(across)
         };
-        let mut starts: Vec<_> = rectangles.iter().flat_map(ways).filter_map(start_at).collect();
+        let mut starts: Vec<_> = rectangles.iter().flat_map(ways).flat_map(start_at).collect();
         // A thing whose two ends differ may lie either way round.
         if starts.first().is_some_and(|(model, _)| model.has_two_ends()) {
             let turned = |r: &Rectangle| Rectangle { yaw: r.yaw + std::f64::consts::PI, ..*r };
             let turned: Vec<Rectangle> = rectangles.iter().map(turned).collect();
-            starts.extend(turned.iter().flat_map(ways).filter_map(start_at));
+            starts.extend(turned.iter().flat_map(ways).flat_map(start_at));
         }
         // What is round starts alike in every rectangle.
         starts.dedup_by(|a, b| a.1 == b.1);
@@ -205,6 +211,19 @@ impl<'a> Starts<'a> {
         });
         near.min_by(|a, b| a.cost.total_cmp(&b.cost))
     }
+}
+
+/// The first guess, and for each angle of the template two more, with the hinge little and far open: no measure of a
+/// segment tells how far.
+fn opened(template: &Template, initial: Vec<f64>) -> Vec<Vec<f64>> {
+    let angles = template.parameters.iter().enumerate().filter(|(_, spec)| spec.unit == Unit::Rad && !spec.fixed);
+    let at = |share: f64| angles.clone().map(move |(index, spec)| (index, spec.min + share * (spec.max - spec.min)));
+    let moved = |(index, value): (usize, f64)| {
+        let mut values = initial.clone();
+        values[index] = value;
+        values
+    };
+    OPENED.into_iter().flat_map(at).map(moved).chain(std::iter::once(initial.clone())).collect()
 }
 
 /// The measures of a segment as they would be if the part were stood upright, from its extents along the axes of its
