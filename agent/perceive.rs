@@ -43,7 +43,7 @@ pub fn run(args: &PerceiveArgs) -> anyhow::Result<Exit> {
         Some(dir) => Box::new(acm_memory::AcmMemory::open(dir, Arc::clone(&library))?),
         None => Box::new(acm_memory::AcmMemory::in_memory(Arc::clone(&library))),
     };
-    let grounder = Grounder::new(Arc::clone(&library), GrounderConfig::default());
+    let grounder = Grounder::new(Arc::clone(&library), GrounderConfig::of_unknown_camera());
     let mut session = Session { input: &input, pictures, library, memory, grounder };
     session.memory.note(&Note::EpisodeBegan)?;
     let progress = Progress::new(input.frames.len());
