@@ -7,6 +7,7 @@
 mod raw;
 mod rest;
 mod shape;
+mod typical;
 
 pub use rest::Rest;
 use shape::SolidSpec;
@@ -123,6 +124,8 @@ pub const WHOLE: &str = "whole";
 pub struct FrameSpec {
     /// Name that function bindings refer to.
     pub name: String,
+    /// Index of the part with which it moves; `None` for the base frame.
+    part: Option<usize>,
     position: [Expression; 3],
     yaw: Expression,
     /// Takes z to the direction out of the part.
@@ -270,11 +273,13 @@ pub enum TemplateError {
         /// The frames there are.
         known: String,
     },
-    /// A solid that names a part which the template does not have.
-    #[error("template file {file}: a solid belongs to part `{part}`, which is not among: {known}")]
+    /// A solid or frame that names a part which the template does not have.
+    #[error("template file {file}: {what} belongs to part `{part}`, which is not among: {known}")]
     UnknownPart {
         /// The file's name.
         file: String,
+        /// The solid or frame.
+        what: String,
         /// The part it names.
         part: String,
         /// The parts there are.
@@ -342,7 +347,9 @@ impl Template {
         let upright = Pose::from_yaw(vector(&spec.position, values)?, spec.yaw.evaluate(values)?);
         let turned = spec.out * DQuat::from_rotation_z(spec.turn.evaluate(values)?);
         let upright_alone = turned == DQuat::IDENTITY;
-        Ok(Some(if upright_alone { upright } else { upright * Pose::new(DVec3::ZERO, turned) }))
+        let own = if upright_alone { upright } else { upright * Pose::new(DVec3::ZERO, turned) };
+        let Some(part) = spec.part else { return Ok(Some(own)) };
+        Ok(self.part_frames(values)?.get(part).map(|frame| *frame * own))
     }
     /// The symmetry of a part with the given parameter values.
     pub fn yaw_symmetry(&self, values: &Values) -> Result<YawSymmetry, ExpressionError> {

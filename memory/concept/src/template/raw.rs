@@ -79,6 +79,7 @@ struct RawPart {
 #[serde(deny_unknown_fields)]
 struct RawFrame {
     name: String,
+    part: Option<String>,
     position: [String; 3],
     #[serde(default = "zero")]
     yaw: String,
@@ -230,7 +231,7 @@ impl Meaning<'_> {
         // First, so that a bad parameter is named itself and not by the expressions that use it.
         let parameters = raw.parameter.iter().map(|p| self.parameter(p)).collect::<Result<_, _>>()?;
         let parts = self.parts(raw)?;
-        let frames = raw.frame.iter().map(|f| self.frame(f)).collect::<Result<Vec<_>, _>>()?;
+        let frames = raw.frame.iter().map(|f| self.frame(f, &parts)).collect::<Result<Vec<_>, _>>()?;
         let symmetry = raw.symmetry.iter().map(|rule| {
             let when = rule.when.as_deref().map(|text| self.expression("symmetry", text)).transpose()?;
             Ok(SymmetryRule { fold: rule.fold, when })
@@ -329,21 +330,29 @@ impl Meaning<'_> {
     }
 
     fn solid(&self, raw: &RawSolid, parts: &[PartSpec]) -> Result<SolidSpec, TemplateError> {
-        let named = |name: &String| parts.iter().position(|part| part.name == *name);
-        let part = raw.part.as_ref().map_or(Some(0), named).ok_or_else(|| TemplateError::UnknownPart {
-            file: self.file.into(),
-            part: raw.part.clone().unwrap_or_default(),
-            known: parts.iter().map(|part| part.name.as_str()).collect::<Vec<_>>().join(", "),
-        })?;
+        let part = self.part("a solid", &raw.part, parts)?.unwrap_or(0);
         let format = |reason: String| TemplateError::Format { file: self.file.into(), reason };
         SolidSpec::read(raw, part, format, |text| self.expression("solid", text))
     }
 
-    fn frame(&self, raw: &RawFrame) -> Result<FrameSpec, TemplateError> {
+    /// The index of a part that a solid or frame names.
+    fn part(&self, what: &str, name: &Option<String>, parts: &[PartSpec]) -> Result<Option<usize>, TemplateError> {
+        let Some(name) = name else { return Ok(None) };
+        let place = parts.iter().position(|part| part.name == *name);
+        place.map(Some).ok_or_else(|| TemplateError::UnknownPart {
+            file: self.file.into(),
+            what: what.into(),
+            part: name.clone(),
+            known: parts.iter().map(|part| part.name.as_str()).collect::<Vec<_>>().join(", "),
+        })
+    }
+
+    fn frame(&self, raw: &RawFrame, parts: &[PartSpec]) -> Result<FrameSpec, TemplateError> {
         let place = format!("frame `{}`", raw.name);
+        let part = self.part(&place, &raw.part, parts)?;
         let (position, yaw) = (self.triple(&place, &raw.position)?, self.expression(&place, &raw.yaw)?);
         let (out, turn) = (raw.out.rotation(), self.expression(&place, &raw.turn)?);
-        Ok(FrameSpec { name: raw.name.clone(), position, yaw, out, turn })
+        Ok(FrameSpec { name: raw.name.clone(), part, position, yaw, out, turn })
     }
 
     fn rest(&self, raw: &RawRest) -> Result<Rest, TemplateError> {

@@ -169,6 +169,11 @@ fn parts_move_with_the_parameters() {
     assert!(case.part_solids("lid", &values).unwrap().is_empty());
     assert_eq!(case.parts[0].affordances, ["supportive"], "the template's own affordances are the main part's");
     assert_eq!(case.affordances().collect::<Vec<_>>(), ["supportive", "openable"]);
+    // A frame may move with a part.
+    let edge = "[[frame]]\nname = \"edge\"\npart = \"flap\"\nposition = [\"length\", \"0\", \"0\"]\nout = \"x\"\n";
+    let with_edge = Template::parse("case.toml", &format!("{CASE}{edge}")).unwrap();
+    let edge = with_edge.frame("edge", &values).unwrap().unwrap();
+    assert!(edge.translation.distance(tip) < 1e-12 && edge.transform_vector(DVec3::Z).distance(DVec3::Z) < 1e-12);
     let error = |from: &str, to: &str| Template::parse("case.toml", &CASE.replace(from, to)).unwrap_err().to_string();
     assert!(error("part = \"flap\"", "part = \"flip\"").contains("`flip`, which is not among: body, flap"));
     assert!(error("name = \"flap\"", "name = \"body\"").contains("`body` is declared twice"));
@@ -210,4 +215,19 @@ fn solids_may_be_hollow_lie_and_be_turned() {
     );
     assert!(solids("shape = \"ellipsoid\"\nradius = \"radius\"").unwrap_err().contains("`ellipsoid` has no `radius`"));
     assert!(solids("shape = \"revolved\"\nprofile = [[\"0\", \"0\"]]").unwrap_err().contains("not 1"));
+}
+
+#[test]
+fn typical_values_are_the_middle_unless_a_constraint_forbids_it() {
+    let typical = |constraints: &str| {
+        let text = PUCK.replace("constraints = [\"height < 2 * radius\"]", &format!("constraints = [{constraints}]"));
+        Template::parse("puck.toml", &text).unwrap().typical()
+    };
+    let middle = [(0.01f64 * 0.1).sqrt(), (0.005f64 * 0.05).sqrt()];
+    let near = |a: Option<Vec<f64>>, b: [f64; 2]| a.unwrap().iter().zip(b).all(|(a, b)| (a / b - 1.0).abs() < 0.02);
+    assert!(near(typical(""), middle));
+    // The nearest to the middle on the line where both are equal.
+    let both = (middle[0] * middle[1]).sqrt();
+    assert!(near(typical("\"height > radius\""), [both, both]));
+    assert_eq!(typical("\"height > radius\", \"radius > 2 * height\""), None);
 }
