@@ -7,7 +7,10 @@ use acm_concept::{
 };
 use anyhow::Context;
 use glam::{DVec2, DVec3};
-use image::{Rgb, RgbImage};
+use image::{
+    Rgb, RgbImage,
+    codecs::png::{CompressionType, FilterType, PngEncoder},
+};
 use std::{fmt::Write as _, fs, io::Write as _, path::Path};
 
 /// Pixels of a picture.
@@ -20,7 +23,9 @@ const MARGIN: f64 = 0.06;
 const EYE: DVec3 = DVec3::new(0.6, -0.62, 0.5);
 const LIGHT: DVec3 = DVec3::new(0.25, -0.55, 0.8);
 /// Steps of brightness: few, so that a picture stays small.
-const SHADES: f64 = 24.0;
+const SHADES: f64 = 16.0;
+/// Steps of the colours' channels.
+const CHANNEL_STEP: f64 = 12.0;
 /// One colour a part, in order.
 const COLORS: [DVec3; 3] =
     [DVec3::new(120.0, 160.0, 205.0), DVec3::new(225.0, 165.0, 95.0), DVec3::new(140.0, 190.0, 130.0)];
@@ -52,9 +57,16 @@ fn write_gallery(dir: &Path) -> anyhow::Result<usize> {
     let all = acm_memory::library_of(&acm_memory::library_groups())?;
     for template in all.iter() {
         let file = pictures.join(format!("{}.png", template.name));
-        picture(template)?.save(&file).with_context(|| format!("{} cannot be written", file.display()))?;
+        write(&picture(template)?, &file).with_context(|| format!("{} cannot be written", file.display()))?;
     }
     Ok(all.iter().count())
+}
+
+/// Writes a picture as small as PNG allows.
+fn write(picture: &RgbImage, file: &Path) -> anyhow::Result<()> {
+    let out = std::io::BufWriter::new(fs::File::create(file)?);
+    let encoder = PngEncoder::new_with_quality(out, CompressionType::Best, FilterType::NoFilter);
+    Ok(picture.write_with_encoder(encoder)?)
 }
 
 /// The text of docs/library.md.
@@ -119,7 +131,10 @@ pub fn picture(template: &Template) -> anyhow::Result<RgbImage> {
         let at = DVec2::new(f64::from(column), f64::from(row));
         let sum: DVec3 = offsets.map(|off| view.color(&solids, at + off / f64::from(RAYS))).sum();
         let mean = sum / f64::from(RAYS * RAYS);
-        Rgb(mean.to_array().map(|value| value.round().clamp(0.0, 255.0) as u8))
+        // What is between two shades becomes one of them; white stays white.
+        Rgb(mean
+            .to_array()
+            .map(|value| (255.0 - ((255.0 - value) / CHANNEL_STEP).round() * CHANNEL_STEP).max(0.0) as u8))
     };
     Ok(RgbImage::from_fn(SIZE.0, SIZE.1, pixel))
 }

@@ -213,3 +213,42 @@ fn slice(edge: [DVec2; 2]) -> Vec<DVec3> {
     };
     (0..2 * RIM).map(point).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use acm_concept::camera::Intrinsics;
+    use glam::DQuat;
+    use proptest::prelude::*;
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(300))]
+        #[test]
+        fn outlines_cover_the_pixels_whose_rays_meet_the_solid(
+            kind in 0..5usize, turn in prop::array::uniform3(-3.0..3.0f64), column in 60.0..260.0f64, row in 20.0..220.0f64,
+        ) {
+            let corners = |points: &[(f64, f64)]| points.iter().map(|(r, z)| DVec2::new(*r, *z)).collect::<Vec<_>>();
+            // A spinning top: none of its slices alone covers it, nor is it convex.
+            let top = Solid::revolved(&corners(&[(0.0, 0.0), (0.03, 0.0), (0.01, 0.05), (0.06, 0.09), (0.0, 0.12)])).unwrap().0;
+            let solid = [
+                Solid::Box { size: DVec3::new(0.14, 0.08, 0.05) },
+                Solid::Cylinder { radius: 0.04, height: 0.1 },
+                Solid::Ellipsoid { size: DVec3::new(0.14, 0.09, 0.05) },
+                Solid::cone(0.06, 0.02, 0.12),
+                top,
+            ][kind];
+            let intrinsics = Intrinsics::from_vertical_fov(320, 240, 0.5);
+            let pose = Pose::new(DVec3::new(0.01, 0.02, 0.5), DQuat::from_scaled_axis(turn.into()));
+            let evidence = Evidence {
+                camera: Pose::IDENTITY, intrinsics, points: Vec::new(), point_weight: 1.0, outline: Vec::new(), outline_weight: 1.0,
+            };
+            let placed = PlacedSolid { solid, pose };
+            let outlines = image_outlines(&placed, &Pose::IDENTITY, &evidence);
+            let pixel = DVec2::new(column, row);
+            let outside = outlines.iter().map(|o| distance_outside(o, pixel)).fold(f64::INFINITY, f64::min);
+            let meets = placed.intersect_ray(DVec3::ZERO, intrinsics.ray(column, row)).is_some();
+            // Polygons with 24 corners stand for circles.
+            prop_assert!(if meets { outside < 1.2 } else { outside > -1.2 }, "{solid:?}: {meets}, {outside} px outside");
+        }
+    }
+}
