@@ -97,7 +97,7 @@ fn missing_and_damaged_frames_are_named() {
 
 #[test]
 fn templates_are_listed_by_group() {
-    let out = Command::cargo_bin("acm").unwrap().args(["library", "core", "blocks"]).output().unwrap();
+    let out = acm().args(["library", "core", "blocks"]).output().unwrap();
     let text = String::from_utf8(out.stdout).unwrap();
     assert!(out.status.success() && text.contains("core       box") && text.contains("blocks     l-block"), "{text}");
     refuses(&["library", "blcks"], &["`blcks`", "blocks"]);
