@@ -169,7 +169,14 @@ fn color_edge(scene: &Scene, pixel: usize, dx: isize, dy: isize) -> Option<f64> 
     };
     let gaps: Vec<f64> = (1..SPAN - 2).map(contrast).collect();
     let away = |at: usize| at as f64 + 0.5 - EDGE_INSIDE as f64;
-    let likely = |at: usize| gaps[at] * (-0.5 * ((away(at) - 0.5) / EDGE_SPREAD_PX).powi(2)).exp();
+    // What lies beyond it goes on beyond it, unlike the next colour of a pattern; a shadow may fall there.
+    let far = SPAN - 2;
+    let beyond = |at: usize| -> f64 {
+        let difference = |c: usize| 0.5 * (lab[at + 2][c] + lab[at + 3][c] - lab[far][c] - lab[far + 1][c]);
+        f64::from((0.3 * difference(0)).powi(2) + difference(1).powi(2) + difference(2).powi(2)).sqrt()
+    };
+    let near = |at: usize| (-0.5 * ((away(at) - 0.5) / EDGE_SPREAD_PX).powi(2)).exp();
+    let likely = |at: usize| gaps[at] * near(at) * (-beyond(at) / EDGE_CONTRAST).exp();
     let best = (0..gaps.len()).max_by(|a, b| likely(*a).total_cmp(&likely(*b)))?;
     if gaps[best] < EDGE_CONTRAST {
         return None;
