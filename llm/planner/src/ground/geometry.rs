@@ -134,6 +134,7 @@ fn separation(a: &[DVec2], b: &[DVec2]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use acm_concept::solid::Solid;
     use proptest::prelude::*;
 
     fn square(x: f64, y: f64, half: f64, yaw: f64) -> Vec<DVec2> {
