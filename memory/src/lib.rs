@@ -15,7 +15,7 @@
 //! | [`FeltJoint`] | a part's hinge or slide as the hand that moved it felt it |
 //!
 //! [`AcmMemory`] is the implementation, in memory or over a folder; the library of templates comes from
-//! [`default_library`] or [`library_from_dir`].
+//! [`default_library`], [`library_of`] some groups or [`library_from_dir`].
 
 mod belief;
 mod draft;
