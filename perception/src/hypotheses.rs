@@ -12,7 +12,7 @@ use crate::{
 use acm_concept::{
     object::GroundedPart,
     pose::Pose,
-    template::{Rest, SeenBy, Template, TemplateLibrary},
+    template::{Rest, SeenBy, Template, TemplateLibrary, Unit},
 };
 use glam::{DQuat, DVec2, DVec3, Vec2Swizzles};
 use nalgebra::DMatrix;
@@ -49,6 +49,8 @@ pub(crate) struct Context<'a> {
 pub(crate) struct Hypothesis<'a> {
     pub model: Model<'a>,
     pub minimum: Minimum,
+    /// Penalised log likelihood with the template's odds.
+    pub score: f64,
     /// Posterior probability among the hypotheses that were tried.
     pub probability: f64,
     /// The remembered part whose parameters were taken over, so that only the place was fitted.
@@ -72,6 +74,8 @@ const HOPELESS_COST: f64 = 25.0;
 /// dropped.
 const FORLORN_FACTOR: f64 = 4.0;
 const FORLORN_COST: f64 = 100.0;
+/// Shares of its range at which a hinge is tried.
+const OPENED: [f64; 2] = [0.25, 0.65];
 /// Starts that are fitted of each template.
 const STARTS: usize = 2;
 
@@ -101,25 +105,25 @@ pub(crate) fn rank<'a>(context: Context<'a>, measured: &Measured, evidence: &Evi
     let best = near.iter().map(|a| a.cost).fold(f64::INFINITY, f64::min);
     // What is far behind after the rough fit is not worth a fine one.
     let promising = near.into_iter().filter(|a| a.cost < HOPELESS_FACTOR * best + HOPELESS_COST);
-    let mut scored: Vec<(f64, Hypothesis<'a>)> = promising
+    let mut scored: Vec<Hypothesis<'a>> = promising
         .filter_map(|Approach { model, state, .. }| {
             let minimum = canonical(&model, minimise(&model, evidence, &state), evidence)?;
             let score = score(context, &model, &minimum, evidence);
-            Some((score, Hypothesis { model, minimum, probability: 0.0, tracked: None }))
+            Some(Hypothesis { model, minimum, score, probability: 0.0, tracked: None })
         })
         .collect();
     scored.extend(track(context, measured, &rectangles, evidence));
-    scored.sort_by(|a, b| b.0.total_cmp(&a.0));
-    if let Some(other) = scored.first().and_then(|(_, best)| tipped::read_anew(context, best, evidence)) {
+    scored.sort_by(|a, b| b.score.total_cmp(&a.score));
+    if let Some(other) = scored.first().and_then(|best| tipped::read_anew(context, best, evidence)) {
         scored.insert(0, other);
     }
-    let Some(best) = scored.first().map(|(score, _)| *score) else { return Vec::new() };
+    let Some(best) = scored.first().map(|best| best.score) else { return Vec::new() };
     // Where even the best fits badly the likelihoods of all are less sure than they look.
-    let misfit = scored.first().map_or(1.0, |(_, h)| h.minimum.cost / (0.5 * evidence.independent()).max(1.0));
+    let misfit = scored.first().map_or(1.0, |h| h.minimum.cost / (0.5 * evidence.independent()).max(1.0));
     let temperature = misfit.max(1.0);
-    let odds: Vec<f64> = scored.iter().map(|(score, _)| ((score - best) / temperature).exp()).collect();
+    let odds: Vec<f64> = scored.iter().map(|h| ((h.score - best) / temperature).exp()).collect();
     let total: f64 = odds.iter().sum();
-    scored.into_iter().zip(odds).map(|((_, h), odd)| Hypothesis { probability: odd / total, ..h }).collect()
+    scored.into_iter().zip(odds).map(|(h, odd)| Hypothesis { probability: odd / total, ..h }).collect()
 }
 
 /// What is settled in memory and explains the evidence as well as noise lets anything do: only its place is fitted,
@@ -129,7 +133,8 @@ fn recognise<'a>(context: Context<'a>, measured: &Measured, evidence: &Evidence)
     let (model, (at, yaw)) = as_remembered(context, part, measured)?;
     let start = model.start(at, yaw);
     let minimum = minimise(&model, evidence, &approach(&model, evidence, &start));
-    let found = Hypothesis { model, minimum, probability: 1.0, tracked: Some(part) };
+    let score = score(context, &model, &minimum, evidence);
+    let found = Hypothesis { model, minimum, score, probability: 1.0, tracked: Some(part) };
     let (on_surface, on_outline) = found.explained(evidence);
     let misfit = found.minimum.cost / (0.5 * evidence.independent()).max(1.0);
     (misfit < RECOGNISED_MISFIT && on_surface > RECOGNISED && on_outline > RECOGNISED_OUTLINE).then_some(found)
@@ -167,12 +172,16 @@ impl<'a> Starts<'a> {
                 None => [rectangle.length, rectangle.width, height_m, radius],
                 Some(rest) => upright_measures(rest, along.extend(height_m)),
             };
-            let model = Model::new(template, template.initial_values(measures).ok()?, measured.base)?.lying(rest);
-            let at = if model.turns { rectangle.centre } else { centre };
+            let values = template.initial_values(measures).map_or(Vec::new(), |initial| opened(template, initial));
             // The measures are along the longer side, or across it.
             let quarter = if along.x < along.y { FRAC_PI_2 } else { 0.0 };
-            let start = model.start(at, rectangle.yaw + quarter);
-            Some((model, start))
+            let started = move |values: Vec<f64>| {
+                let model = Model::new(template, values, measured.base)?.lying(rest);
+                let at = if model.turns { rectangle.centre } else { centre };
+                let start = model.start(at, rectangle.yaw + quarter);
+                Some((model, start))
+            };
+            values.into_iter().filter_map(started).collect::<Vec<_>>()
         };
         // In another rest either side of the rectangle may be the part's own height.
         let ways = |rectangle| {
@@ -180,12 +189,12 @@ impl<'a> Starts<'a> {
             let across = rest.map(|_| (rectangle, sides(rectangle).yx()));
             std::iter::once((rectangle, sides(rectangle))).chain(across)
         };
-        let mut starts: Vec<_> = rectangles.iter().flat_map(ways).filter_map(start_at).collect();
+        let mut starts: Vec<_> = rectangles.iter().flat_map(ways).flat_map(start_at).collect();
         // A thing whose two ends differ may lie either way round.
         if starts.first().is_some_and(|(model, _)| model.has_two_ends()) {
             let turned = |r: &Rectangle| Rectangle { yaw: r.yaw + std::f64::consts::PI, ..*r };
             let turned: Vec<Rectangle> = rectangles.iter().map(turned).collect();
-            starts.extend(turned.iter().flat_map(ways).filter_map(start_at));
+            starts.extend(turned.iter().flat_map(ways).flat_map(start_at));
         }
         // What is round starts alike in every rectangle.
         starts.dedup_by(|a, b| a.1 == b.1);
@@ -205,6 +214,19 @@ impl<'a> Starts<'a> {
         });
         near.min_by(|a, b| a.cost.total_cmp(&b.cost))
     }
+}
+
+/// The first guess, and for each angle of the template two more, with the hinge little and far open: no measure of a
+/// segment tells how far.
+fn opened(template: &Template, initial: Vec<f64>) -> Vec<Vec<f64>> {
+    let angles = template.parameters.iter().enumerate().filter(|(_, spec)| spec.unit == Unit::Rad && !spec.fixed);
+    let at = |share: f64| angles.clone().map(move |(index, spec)| (index, spec.min + share * (spec.max - spec.min)));
+    let moved = |(index, value): (usize, f64)| {
+        let mut values = initial.clone();
+        values[index] = value;
+        values
+    };
+    OPENED.into_iter().flat_map(at).map(moved).chain(std::iter::once(initial.clone())).collect()
 }
 
 /// The measures of a segment as they would be if the part were stood upright, from its extents along the axes of its
@@ -243,7 +265,7 @@ fn track<'a>(
     measured: &Measured,
     rectangles: &[Rectangle],
     evidence: &Evidence,
-) -> Option<(f64, Hypothesis<'a>)> {
+) -> Option<Hypothesis<'a>> {
     let Known { part, .. } = context.remembered.filter(|_| evidence.cut_share() > TRACKED_CUT)?;
     let (model, own) = as_remembered(context, part, measured)?;
     let starts = std::iter::once(own).chain(rectangles.iter().map(|r| (r.centre, r.yaw)));
@@ -254,7 +276,7 @@ fn track<'a>(
     let (_, start) = starts.map(rough).min_by(|a, b| a.0.total_cmp(&b.0))?;
     let minimum = minimise(&model, evidence, &approach(&model, evidence, &start));
     let score = score(context, &model, &minimum, evidence);
-    Some((score, Hypothesis { model, minimum, probability: 0.0, tracked: Some(part) }))
+    Some(Hypothesis { model, minimum, score, probability: 0.0, tracked: Some(part) })
 }
 
 /// The same solids under parameter values that the template admits: as they are, or with two parameters exchanged
@@ -305,6 +327,8 @@ fn score(context: Context, model: &Model, minimum: &Minimum, evidence: &Evidence
 
 /// A residual up to this many standard deviations counts as explained.
 const EXPLAINED: f64 = 3.0;
+/// So is an outline point up to this many pixels, however sharp the edge.
+const EXPLAINED_PX: f64 = 4.5;
 
 impl Hypothesis<'_> {
     /// Share of the evidence that the fit explains: of the surface points, and of the outline points that are the
@@ -315,13 +339,13 @@ impl Hypothesis<'_> {
         let (points, outline) = residuals.split_at(evidence.points.len().min(residuals.len()));
         let share = |good: usize, all: usize| if all == 0 { 1.0 } else { good as f64 / all as f64 };
         let fits = |r: &&f64| r.abs() < EXPLAINED;
-        let own: Vec<f64> = outline
+        let own: Vec<bool> = outline
             .iter()
             .zip(&evidence.outline)
             .filter(|(_, p)| p.kind == OutlineKind::Own)
-            .map(|(r, _)| *r)
+            .map(|(r, p)| r.abs() < EXPLAINED.max(EXPLAINED_PX / p.sigma_px))
             .collect();
-        (share(points.iter().filter(fits).count(), points.len()), share(own.iter().filter(fits).count(), own.len()))
+        (share(points.iter().filter(fits).count(), points.len()), share(own.iter().filter(|fits| **fits).count(), own.len()))
     }
 }
 
