@@ -7,6 +7,7 @@ use crate::{
     bench::{perception::PerceptionPart, world::WorldPart},
     demo, doctor,
     inject::Injection,
+    library,
     llm::LlmId,
     perceive, run, scenario, serve,
 };
@@ -75,6 +76,8 @@ pub enum Command {
     /// List, check, describe or draw scenarios.
     #[command(subcommand)]
     Scenario(ScenarioCommand),
+    /// List the templates in this program, or draw them.
+    Library(LibraryArgs),
     /// Run the simulator in a process of its own.
     #[command(subcommand)]
     Sim(SimCommand),
@@ -293,6 +296,16 @@ pub struct PerceiveArgs {
     pub json: bool,
 }
 
+/// Arguments of `acm library`.
+#[derive(Debug, Args)]
+pub struct LibraryArgs {
+    /// Groups to list, such as core or kitchen; all if none is named.
+    pub groups: Vec<String>,
+    /// Write library.md and a picture of each template below this folder instead.
+    #[arg(long, value_name = "DIR", conflicts_with = "groups")]
+    pub gallery: Option<PathBuf>,
+}
+
 /// The verbs of `acm scenario`.
 #[derive(Debug, Subcommand)]
 pub enum ScenarioCommand {
@@ -439,6 +452,7 @@ pub fn run(cli: Cli) -> anyhow::Result<Exit> {
         Command::Demo(args) => demo::run(&args),
         Command::Perceive(args) => perceive::run(&args),
         Command::Scenario(command) => scenario::run(&command),
+        Command::Library(args) => library::run(&args),
         Command::Sim(SimCommand::Serve(args)) => serve::run(&args),
         Command::Trace(command) => crate::trace::run(&command),
         Command::Bench(command) => bench::run(&command),

@@ -15,7 +15,7 @@
 //! | [`demo`] | `acm demo`: the first minute |
 //! | [`perceive`] | `acm perceive`: real frames, no simulator |
 //! | [`mod@bench`] | `acm bench`: figures beside what they are to reach |
-//! | [`scenario`], [`doctor`] | `acm scenario`, `acm doctor` |
+//! | [`scenario`], [`library`], [`doctor`] | `acm scenario`, `acm library`, `acm doctor` |
 //! | [`trace`] | `acm trace`: a run written down, and looked into |
 //! | [`video`] | `acm run --video`: an episode as moving pictures |
 //! | [`embed`] | what the pages of `acm demo` and `acm trace` have in common |
@@ -30,6 +30,7 @@ pub mod doctor;
 pub mod embed;
 pub mod episode;
 pub mod inject;
+pub mod library;
 pub mod live;
 pub mod llm;
 pub mod narrate;
