@@ -49,6 +49,6 @@ pub(super) fn params(
         covariance: indices.clone().map(|a| indices.clone().map(|b| entry(a, b)).collect()).collect(),
         observability: part.parameters.iter().map(|parameter| parameter.observability).collect(),
         support_px,
-        residual_m: (squares.sum::<f64>() / evidence.points.len().max(1) as f64).sqrt(),
+        residual_m: Some((squares.sum::<f64>() / evidence.points.len().max(1) as f64).sqrt()),
     }
 }

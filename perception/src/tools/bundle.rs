@@ -121,13 +121,14 @@ impl Tools {
     ) -> Option<Answer<Vec<PartHypothesis>>> {
         let tool = self.part_recogniser.as_deref()?;
         let check = |found: &Vec<PartHypothesis>| check::hypotheses(found, library);
-        Some(something(self.ask(tool, request, || tool.recognise(request, mask, library), check)))
+        let call = || of_a_mask(request, mask, || tool.recognise(request, mask, library));
+        Some(something(self.ask(tool, request, call, check)))
     }
     /// Asks the pose estimator, if there is one.
     pub fn pose(&self, request: &Request, part: &PartView, prior: Option<&PoseBelief>) -> Option<Answer<PoseBelief>> {
         let tool = self.pose_estimator.as_deref()?;
         let check = |found: &PoseBelief| check::pose(found, &request.frame.header);
-        Some(self.ask(tool, request, || tool.pose(request, part, prior), check))
+        Some(self.ask(tool, request, || of_a_mask(request, part.mask, || tool.pose(request, part, prior)), check))
     }
     /// Asks the parameter estimator, if there is one.
     pub fn params(
@@ -138,7 +139,7 @@ impl Tools {
     ) -> Option<Answer<ParamBelief>> {
         let tool = self.param_estimator.as_deref()?;
         let check = |found: &ParamBelief| check::params(found, part);
-        Some(self.ask(tool, request, || tool.params(request, part, prior), check))
+        Some(self.ask(tool, request, || of_a_mask(request, part.mask, || tool.params(request, part, prior)), check))
     }
 
     /// Asks, and believes neither a late answer nor one that makes no sense.
@@ -161,6 +162,15 @@ impl Tools {
         };
         let (identity, frame) = (tool.identity(), request.frame.header.id);
         Answer { meta: ToolMeta { identity, request: request.id, frame, latency }, outcome }
+    }
+}
+
+/// No tool is asked about a mask that is none of the frame.
+fn of_a_mask<T>(request: &Request, mask: &PixelSupport, call: impl FnOnce() -> Outcome<T>) -> Outcome<T> {
+    match Mask::from_runs(mask.runs.clone(), &request.frame.header.intrinsics, 1.0) {
+        Ok(read) if read.support == *mask => call(),
+        Ok(_) => Outcome::Failed(ToolError::bad_request("mask", "has another count or other bounds than its runs")),
+        Err(error) => Outcome::Failed(ToolError::bad_request("mask", error.to_string())),
     }
 }
 

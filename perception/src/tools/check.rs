@@ -133,8 +133,8 @@ pub(super) fn params(belief: &ParamBelief, part: &PartView) -> Checked {
             return invalid(format!("observability.{}", spec.name), format!("is the interval from {low} to {high}"));
         }
     }
-    if !(belief.residual_m.is_finite() && belief.residual_m >= 0.0) {
-        return invalid("residual_m", format!("is {}", belief.residual_m));
+    if let Some(residual_m) = belief.residual_m.filter(|residual| !(residual.is_finite() && *residual >= 0.0)) {
+        return invalid("residual_m", format!("is {residual_m}"));
     }
     if belief.covariance.len() != size || belief.covariance.iter().any(|row| row.len() != size) {
         return invalid("covariance", format!("is not {size} x {size}"));

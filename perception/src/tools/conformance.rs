@@ -74,21 +74,27 @@ pub fn answers(tools: &Tools, trial: &Trial) -> Result<Vec<Told>, Breach> {
     })
 }
 
-/// Asks what cannot be answered: about frames that show nothing, and about masks that are none of the frame.
+/// Asks what cannot be answered. About masks that are none of the frame no tool says anything; in frames that show
+/// nothing a tool may see what it likes, and perception with it still sees nothing.
 ///
 /// # Errors
-/// A tool that answers all the same.
+/// A tool that answers all the same, or something in the percepts of a frame that shows nothing.
 pub fn unfit_requests(tools: &Tools, trial: &Trial) -> Result<Vec<Told>, Breach> {
     let mut all = Vec::new();
-    for frame in trial.blind_frames() {
-        all.extend(ask_all(tools, trial, &frame, None, &mut |told, _| no_value(told))?);
-    }
     for mask in trial.unfit_masks() {
         let mut judge = |told: &Told, _: Result<(), String>| match told.asked {
             "detect" | "segment" => Ok(()),
             _ => no_value(told),
         };
         all.extend(ask_all(tools, trial, &trial.frame, Some(&mask), &mut judge)?);
+    }
+    for frame in trial.blind_frames() {
+        all.extend(ask_all(tools, trial, &frame, None, &mut |_, _| Ok(()))?);
+        let percepts = grounder(trial).with_tools(tools.clone()).ground(&frame, &Expectation::default()).percepts;
+        if percepts.blindness.is_none() || !percepts.objects.is_empty() {
+            let what = format!("{} objects in a frame that shows nothing", percepts.objects.len());
+            return Err(Breach { tool: format!("{tools:?}"), asked: "ground", what });
+        }
     }
     Ok(all)
 }

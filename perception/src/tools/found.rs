@@ -106,6 +106,7 @@ pub struct ParamBelief {
     pub observability: Vec<Observability>,
     /// Pixels that the values rest on.
     pub support_px: u32,
-    /// Root mean square distance of these pixels' points from the solids with these values, metres.
-    pub residual_m: f64,
+    /// Root mean square distance of these pixels' points from the solids with these values, metres; `None` from a tool
+    /// that does not place them.
+    pub residual_m: Option<f64>,
 }

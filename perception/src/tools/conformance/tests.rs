@@ -1,5 +1,5 @@
 use super::*;
-use crate::tools::Identity;
+use crate::tools::{Identity, PoseEstimator as _};
 
 fn trial() -> Trial {
     Trial::new().unwrap()
@@ -19,7 +19,9 @@ fn geometry_answers_all_that_is_asked() {
 fn geometry_refuses_what_cannot_be_answered() {
     let trial = trial();
     let told = unfit_requests(&geometric(&trial), &trial).unwrap();
-    assert_eq!(told.len(), 8 * (2 + 3 * trial.things.len()));
+    assert_eq!(told.len(), 7 * (2 + 3 * trial.things.len()));
+    let of_blind_frames = told.split_at(3 * (2 + 3 * trial.things.len())).1;
+    assert!(of_blind_frames.iter().all(|told| matches!(told.outcome, Outcome::Abstain(Reason::Blind(_)))), "{told:?}");
 }
 
 #[test]
@@ -85,4 +87,41 @@ fn masks_take_the_place_of_segments_and_partial_ones_stand_beside_them() {
     };
     assert_eq!(ground(false), (vec!["can".into()], "1 of 1 masks, those that stand on the surface".into()));
     assert_eq!(ground(true).0, ["block", "can"]);
+}
+
+/// A pose estimator that is sure of a place 6 cm off.
+struct Elsewhere(Geometric);
+
+impl crate::tools::Tool for Elsewhere {
+    fn identity(&self) -> Identity {
+        Identity { tool: "elsewhere".into(), version: "1".into(), model_digest: None }
+    }
+}
+
+impl crate::tools::PoseEstimator for Elsewhere {
+    fn pose(
+        &self,
+        request: &Request,
+        part: &PartView,
+        prior: Option<&crate::tools::PoseBelief>,
+    ) -> Outcome<crate::tools::PoseBelief> {
+        self.0.pose(request, part, prior).map(|mut belief| {
+            belief.pose.translation.x += 0.06;
+            belief.covariance = [[0.0; 6]; 6];
+            belief
+        })
+    }
+}
+
+#[test]
+fn a_wrong_pose_is_not_the_last_word() {
+    let trial = trial();
+    let pose_estimator: Arc<dyn crate::tools::PoseEstimator> = Arc::new(Elsewhere(Geometric::new(grounder(&trial))));
+    let tools = Tools { pose_estimator: Some(pose_estimator), ..Tools::default() };
+    let alone = grounder(&trial).ground(&trial.frame, &Expectation::default());
+    let assisted = grounder(&trial).with_tools(tools).ground(&trial.frame, &Expectation::default());
+    for (a, b) in alone.objects.iter().zip(&assisted.percepts.objects) {
+        let off = a.pose().unwrap().pose.translation.distance(b.pose().unwrap().pose.translation);
+        assert!(off < 1e-3, "{off}");
+    }
 }
