@@ -87,7 +87,9 @@ fn every_fault_of_a_server_ends_in_a_typed_outcome() {
         let (address, limit) = match fault {
             Fault::Late => (format!("{}/late", server.address), Duration::from_millis(100)),
             // Nobody listens at a port that was just given back.
-            Fault::Refused => (format!("http://{}", TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap()), PATIENT),
+            Fault::Refused => {
+                (format!("http://{}", TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap()), PATIENT)
+            }
             _ => (format!("{}/{}", server.address, fault.name()), PATIENT),
         };
         let told = conformance::withstands(&tools(&address, limit), &trial, fault).unwrap();

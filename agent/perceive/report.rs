@@ -203,7 +203,8 @@ impl FrameReport {
         let mut lines: Vec<(String, usize)> = Vec::new();
         for call in &self.tools {
             let remark = call.remark.as_ref().map_or_else(String::new, |remark| format!(", {remark}"));
-            let line = format!("{} asked to {}: {}{remark}; {}", call.meta.identity.tool, call.asked, call.outcome, call.made);
+            let line =
+                format!("{} asked to {}: {}{remark}; {}", call.meta.identity.tool, call.asked, call.outcome, call.made);
             match lines.iter_mut().find(|(known, _)| *known == line) {
                 Some((_, count)) => *count += 1,
                 None => lines.push((line, 1)),

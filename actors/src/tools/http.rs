@@ -1,6 +1,8 @@
 //! A tool behind an HTTP address.
 
-use super::wire::{About, REPLY, REQUEST, WireFrame, WireOutcome, WirePart, WirePose, WireReply, WireRequest, templates};
+use super::wire::{
+    About, REPLY, REQUEST, WireFrame, WireOutcome, WirePart, WirePose, WireReply, WireRequest, templates,
+};
 use acm_concept::{camera::RgbdFrame, object::PixelSupport, template::TemplateLibrary};
 use acm_perception::tools::{
     Detection, Detector, Gap, Identity, Mask, Outcome, ParamBelief, ParamEstimator, PartHypothesis, PartRecogniser,

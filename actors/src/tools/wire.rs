@@ -181,7 +181,10 @@ impl WirePose {
         // Written with few digits it may be a little off one.
         let length = self.rotation.length();
         if !((length - 1.0).abs() < 1e-3) {
-            return Err(ToolError::invalid("pose.rotation", format!("has length {length}, but a rotation has length 1")));
+            return Err(ToolError::invalid(
+                "pose.rotation",
+                format!("has length {length}, but a rotation has length 1"),
+            ));
         }
         let pose = Pose::new(self.translation, self.rotation.normalize());
         Ok(PoseBelief {

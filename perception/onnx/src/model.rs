@@ -2,10 +2,10 @@
 
 use crate::tensors::Tensor;
 use acm_perception::tools::{Identity, ToolError};
-use ort::{session::Session, value::TensorRef};
+use ort::{environment::Environment, session::Session, value::TensorRef};
 use std::{
     path::{Path, PathBuf},
-    sync::{Mutex, PoisonError},
+    sync::{Mutex, OnceLock, PoisonError},
 };
 use thiserror::Error;
 
@@ -18,7 +18,9 @@ const MAX_MODEL_BYTES: u64 = 4 << 30;
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum OpenError {
     /// Nobody said where the runtime is.
-    #[error("ORT_DYLIB_PATH is not set: give it the path of libonnxruntime.so, such as the one in the onnxruntime wheel")]
+    #[error(
+        "ORT_DYLIB_PATH is not set: give it the path of libonnxruntime.so, such as the one in the onnxruntime wheel"
+    )]
     NoLibrary,
     /// What is there is no runtime, or too old a one.
     #[error("ORT_DYLIB_PATH: {reason}")]
@@ -65,8 +67,7 @@ impl Model {
             return Err(refused(format!("it is longer than {MAX_MODEL_BYTES} bytes")));
         }
         let file = std::fs::read(path).map_err(|error| refused(error.to_string()))?;
-        load_runtime()?;
-        let session = Session::builder().and_then(|mut builder| builder.commit_from_memory(&file));
+        let session = Session::builder(runtime()?).and_then(|mut builder| builder.commit_from_memory(&file));
         let session = session.map_err(|error| refused(one_line(error)))?;
         let inputs: Vec<&str> = session.inputs().iter().map(|outlet| outlet.name()).collect();
         let given: Vec<&str> = session.outputs().iter().map(|outlet| outlet.name()).collect();
@@ -112,11 +113,16 @@ impl Model {
     }
 }
 
-/// Opens the runtime's library; a second time nothing happens. Without this the first call would end the process where
-/// the library is missing.
-fn load_runtime() -> Result<(), OpenError> {
+/// The runtime of this process. Its library is opened the first time; without doing so here the first call into it would
+/// end the process where the library is missing.
+fn runtime() -> Result<&'static Environment, OpenError> {
+    static RUNTIME: OnceLock<Environment> = OnceLock::new();
+    if let Some(runtime) = RUNTIME.get() {
+        return Ok(runtime);
+    }
     let path = std::env::var_os(LIBRARY).filter(|path| !path.is_empty()).ok_or(OpenError::NoLibrary)?;
     let broken = |reason: String| OpenError::Library { reason };
-    ort::init_from(PathBuf::from(path)).map_err(|error| broken(one_line(error)))?.commit();
-    Ok(())
+    let builder = ort::init_from(PathBuf::from(path)).map_err(|error| broken(one_line(error)))?;
+    let runtime = builder.build().map_err(|error| broken(one_line(error)))?;
+    Ok(RUNTIME.get_or_init(|| runtime))
 }

@@ -119,7 +119,9 @@ pub(crate) fn belief(
     };
     Ok(ParamBelief {
         mean: values.values.iter().map(|value| f64::from(*value)).collect(),
-        covariance: (0..size).map(|i| (0..size).map(|j| if i == j { sigma(i).powi(2) } else { 0.0 }).collect()).collect(),
+        covariance: (0..size)
+            .map(|i| (0..size).map(|j| if i == j { sigma(i).powi(2) } else { 0.0 }).collect())
+            .collect(),
         observability: template.parameters.iter().enumerate().map(known).collect(),
         support_px,
         residual_m: None,

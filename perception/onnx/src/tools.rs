@@ -5,7 +5,8 @@ use crate::{
     tensors,
 };
 use acm_perception::tools::{
-    Identity, Mask, Outcome, ParamBelief, ParamEstimator, PartView, Prompts, Reason, Request, Segmenter, Tool, ToolError,
+    Identity, Mask, Outcome, ParamBelief, ParamEstimator, PartView, Prompts, Reason, Request, Segmenter, Tool,
+    ToolError,
 };
 use std::path::Path;
 

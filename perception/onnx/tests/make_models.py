@@ -35,14 +35,16 @@ def segmenter(name, rows, bias, after=None, size=("h", "w")):
     ] + (after or [])
     weights = np.array(rows, dtype=np.float32).reshape(len(rows), 4, 1, 1)
     constants = [constant("weights", weights), constant("bias", bias), constant("zero", 0.0)]
-    write(name, nodes, [tensor("image", [1, 4, *size])], [tensor("scores", None)], constants)
+    write(name, nodes, [tensor("image", [1, 4, *size])], [tensor("scores", ["b", "k", "y", "x"])], constants)
 
 
 RED_BLUE = [[60, -60, 0, 0], [-60, 0, 60, 0]]
 segmenter("segmenter", RED_BLUE, [-12, -12])
 segmenter("nothing", RED_BLUE, [-900, -900])
-segmenter("nan", RED_BLUE, [-12, -12], [helper.make_node("Div", ["zero", "zero"], ["nan"]), helper.make_node("Add", ["sure", "nan"], ["scores"])])
-segmenter("transposed", RED_BLUE, [-12, -12], [helper.make_node("Transpose", ["sure"], ["scores"], perm=[0, 1, 3, 2])])
+divide = helper.make_node("Div", ["zero", "zero"], ["nan"])
+segmenter("nan", RED_BLUE, [-12, -12], [divide, helper.make_node("Add", ["sure", "nan"], ["scores"])])
+turn = helper.make_node("Transpose", ["sure"], ["scores"], perm=[0, 1, 3, 2])
+segmenter("transposed", RED_BLUE, [-12, -12], [turn])
 segmenter("fixed", RED_BLUE, [-12, -12], size=(32, 32))
 
 
@@ -56,7 +58,8 @@ def estimator(name, metadata, sigmas=(0.01, 0.01, 0.01)):
         helper.make_node("Identity", ["spread"], ["sigmas"]),
     ]
     constants = [constant("weights", np.diag([0.9, 0.7, 1.0])), constant("spread", [sigmas])]
-    write(name, nodes, [tensor("cloud", [1, 512, 3])], [tensor("values", None), tensor("sigmas", None)], constants, metadata)
+    outputs = [tensor("values", ["b", "p"]), tensor("sigmas", ["b", "q"])]
+    write(name, nodes, [tensor("cloud", [1, 512, 3])], outputs, constants, metadata)
 
 
 estimator("block", {"template": "block"})

@@ -84,10 +84,35 @@ fn every_fault_of_a_model_ends_in_a_typed_outcome() {
 #[test]
 fn what_is_no_model_is_refused_in_a_line() {
     let Some(folder) = models() else { return };
-    for (model, word) in [("garbage", "garbage.onnx"), ("truncated", "truncated.onnx"), ("none", "none.onnx"), ("block", "image")] {
+    for (model, word) in
+        [("garbage", "garbage.onnx"), ("truncated", "truncated.onnx"), ("none", "none.onnx"), ("block", "image")]
+    {
         let error = OnnxSegmenter::open(&path(&folder, model)).err().unwrap().to_string();
         assert!(error.contains(word) && !error.contains('\n'), "{error}");
     }
     let error = OnnxParamEstimator::open(&path(&folder, "nameless")).err().unwrap().to_string();
     assert!(error.contains("names no template"), "{error}");
+}
+
+/// Set in the process that a test starts of itself.
+const INNER: &str = "ACM_ONNX_INNER";
+
+#[test]
+fn a_missing_library_is_told_in_a_line() {
+    if let Some(model) = std::env::var_os(INNER) {
+        let error = OnnxSegmenter::open(Path::new(&model)).err().unwrap();
+        println!("told: {error}");
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let model = path(&folder, "any");
+    std::fs::write(&model, b"any").unwrap();
+    for (library, word) in [("", "ORT_DYLIB_PATH is not set"), ("/no/such/lib.so", "/no/such/lib.so")] {
+        let mut inner = Command::new(std::env::current_exe().unwrap());
+        inner.args(["--exact", "a_missing_library_is_told_in_a_line", "--nocapture"]);
+        let output = inner.env(INNER, &model).env("ORT_DYLIB_PATH", library).output().unwrap();
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        let told = text.lines().find(|line| line.contains("told: ")).unwrap_or_else(|| panic!("{text}"));
+        assert!(output.status.success() && told.contains(word), "{text}");
+    }
 }
