@@ -16,6 +16,8 @@ use std::collections::BTreeSet;
 const MAX_JOINS: usize = 24;
 /// Colours of the parts of one thing that are joined by their shape differ by less, in the units of a tint.
 const SAME_TINT: f32 = 12.0;
+/// Parts of one thing that do not touch in the image are nearer to each other than this.
+const NEAR_M: f64 = 0.02;
 /// Tops of pieces of one thing are level within this.
 const LEVEL_M: f64 = 0.016;
 
@@ -33,6 +35,16 @@ impl Piece {
         let evidence = Evidence::of_segment(scene, segments, &pixels);
         let (top_m, lowest_m) = (evidence.top_m(), scene.lowest_m(&pixels));
         (!evidence.points.is_empty()).then_some(Piece { label, pixels, evidence, top_m, lowest_m })
+    }
+    /// Least distance between some surface points of either, metres.
+    fn distance_m(&self, other: &Piece) -> f64 {
+        let some = |piece: &Piece| -> Vec<glam::DVec3> {
+            let step = (piece.evidence.points.len() / 100).max(1);
+            piece.evidence.points.iter().step_by(step).map(|p| p.position).collect()
+        };
+        let others = some(other);
+        let to = |at: glam::DVec3| others.iter().map(move |b| at.distance(*b)).fold(f64::INFINITY, f64::min);
+        some(self).into_iter().map(to).fold(f64::INFINITY, f64::min)
     }
     /// Share of the surface points near the top: large where a top face is seen, small on a wall.
     fn top_share(&self) -> f64 {
@@ -191,18 +203,28 @@ fn is_one_with(scene: &Scene, segments: &Segments, context: Context, a: &Piece, 
     let either = [OutlineKind::Contact, OutlineKind::Cut, OutlineKind::Own];
     let touches = |piece: &Piece, other: &Piece| piece.evidence.border_share(other.label, &either) > 0.15;
     let tint = |piece: &Piece| Tint::of(&scene.scan.appearance(&piece.pixels).mean);
-    if a.label > b.label || !(touches(a, b) || touches(b, a)) || tint(a).distance(&tint(b)) > SAME_TINT {
+    if a.label > b.label || tint(a).distance(&tint(b)) > SAME_TINT {
+        return false;
+    }
+    // Parts that are apart in the image, as the jaws of what stands open, are near each other in space.
+    let touching = touches(a, b) || touches(b, a);
+    if !touching && a.distance_m(b) > NEAR_M {
         return false;
     }
     let joint = union(scene, segments, a, b, false);
     let Some(comparison) = compare(context, &joint, a, b) else { return false };
-    comparison.together < comparison.apart && comparison.on_surface > 0.93 && comparison.on_outline > 0.85
+    comparison.together < comparison.apart
+        && comparison.on_surface > 0.93
+        && comparison.on_outline > 0.85
+        && (touching || comparison.solids > 1)
 }
 
 /// What it costs to explain two pieces as one thing and as two, and how much the one explains.
 struct Comparison {
     together: f64,
     apart: f64,
+    /// Of which the one is made.
+    solids: usize,
     on_surface: f64,
     on_outline: f64,
 }
@@ -219,6 +241,7 @@ fn compare(context: Context, joint: &Evidence, a: &Piece, b: &Piece) -> Option<C
     Some(Comparison {
         together: penalty(&one, joint) * share.max(1.0),
         apart: penalty(&left, &a.evidence) + penalty(&right, &b.evidence),
+        solids: one.model.solids(&one.minimum.state).len(),
         on_surface,
         on_outline,
     })

@@ -49,7 +49,7 @@ pub(crate) fn find(scene: &Scene, standing: &[bool]) -> Vec<Patch> {
     let (labels, sizes) = scene.grid.components(&mask, alike);
     let mut pieces: Vec<Vec<usize>> = vec![Vec::new(); sizes.len()];
     for (index, &label) in labels.iter().enumerate() {
-        if sizes.get(label as usize).is_some_and(|size| *size >= scene.config.min_segment_px / 2) {
+        if sizes.get(label as usize).is_some_and(|size| *size >= scene.min_segment_px() / 2) {
             pieces[label as usize].push(index);
         }
     }
@@ -210,7 +210,7 @@ fn patch(scene: &Scene, ground: &[Ground], pixels: Vec<usize>) -> Option<Patch> 
     let plan = plan(scene, &pixels);
     let rectangle = rectangle(&plan)?;
     let fill = fill(scene, ground, &rectangle, &pixels);
-    if pixels.len() < scene.config.min_segment_px || rectangle.width < scene.config.min_patch_m || fill < 0.8 {
+    if pixels.len() < scene.min_segment_px() || rectangle.width < scene.config.min_patch_m || fill < 0.8 {
         return None;
     }
     let outline = outline(scene, ground, &pixels);
