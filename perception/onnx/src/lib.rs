@@ -2,9 +2,9 @@
 //!
 //! A model is a file with a documented tensor interface (docs/perception-tools.md): a *segmenter* takes an image with
 //! depth and gives a score for each pixel and thing, a *parameter estimator* of one template takes a cloud of points and
-//! gives values with standard deviations. What goes in and comes out is plain arithmetic and always built (`tensors`);
-//! the runtime is behind the feature `runtime`, is loaded from the path in `ORT_DYLIB_PATH`, and what it answers is
-//! checked like any tool's answer.
+//! gives values with standard deviations. Without the feature `runtime` the crate is empty but for the tests of what goes in
+//! and comes out; with it the runtime is loaded from the path in `ORT_DYLIB_PATH`, and what it answers is checked like any
+//! tool's answer.
 //!
 //! | module | holds |
 //! |---|---|
@@ -12,6 +12,7 @@
 //! | `model` | a file and the runtime that computes it |
 //! | `tools` | the two tools |
 
+#[cfg(any(test, feature = "runtime"))]
 mod tensors;
 
 #[cfg(feature = "runtime")]
@@ -21,6 +22,7 @@ mod tools;
 
 #[cfg(feature = "runtime")]
 pub use model::OpenError;
-pub use tensors::{CLOUD_POINTS, IMAGE_CHANNELS, Tensor};
+#[cfg(feature = "runtime")]
+pub use tensors::{CLOUD_POINTS, IMAGE_CHANNELS};
 #[cfg(feature = "runtime")]
 pub use tools::{OnnxParamEstimator, OnnxSegmenter};

@@ -134,6 +134,17 @@ mod tests {
     use acm_perception::tools::conformance::Trial;
 
     #[test]
+    fn an_image_has_its_channels_one_after_the_other() {
+        let trial = Trial::new().unwrap();
+        let image = image(&trial.frame).unwrap();
+        assert_eq!(image.shape, [1, IMAGE_CHANNELS, 240, 320]);
+        let (pixels, at) = (320 * 240, trial.things[0].mask.indices()[0]);
+        let channels: Vec<f32> = (0..IMAGE_CHANNELS).map(|channel| image.values[channel * pixels + at]).collect();
+        let [red, green, blue] = trial.frame.rgb(at).map(|value| f32::from(value) / 255.0);
+        assert_eq!(channels, [red, green, blue, trial.frame.depth[at]]);
+    }
+
+    #[test]
     fn scores_become_masks_that_share_no_pixel() {
         let trial = Trial::new().unwrap();
         let size = trial.frame.depth.len();

@@ -6,7 +6,7 @@ use crate::{
     hypotheses::{Context, Hypothesis, Measured, advised},
     scene::Scene,
     segments::{NONE, Segments},
-    tools::{Answer, Mask, Outcome, PartView, Prompts, Request, ToolCall, Tools},
+    tools::{Answer, Mask, Outcome, PartView, Prompts, Request, ToolCall, ToolError, Tools},
 };
 use acm_concept::{
     camera::RgbdFrame,
@@ -56,7 +56,7 @@ impl AssistedGrounder {
     /// Says what a frame shows, as [`Grounder::ground`] does, with the help of the tools. Never fails: without a word
     /// from any tool the percepts are those of the grounder alone.
     pub fn ground(&self, frame: &RgbdFrame, expectation: &Expectation) -> Assisted {
-        let mut aid = Aid { with: Some((self, frame)), calls: Vec::new() };
+        let mut aid = Aid { with: Some((self, frame)), ..Aid::none() };
         let percepts = self.grounder.ground_with(frame, expectation, &mut aid);
         Assisted { percepts, calls: aid.calls }
     }
@@ -70,12 +70,15 @@ const STANDING: f64 = 0.5;
 pub(super) struct Aid<'a> {
     with: Option<(&'a AssistedGrounder, &'a RgbdFrame)>,
     calls: Vec<ToolCall>,
+    /// Questions to which nobody answered in time: they are not asked again in this frame, or one server that hangs
+    /// would cost its deadline for each segment.
+    given_up: Vec<&'static str>,
 }
 
 impl<'a> Aid<'a> {
     /// Nobody to ask.
     pub fn none() -> Aid<'static> {
-        Aid { with: None, calls: Vec::new() }
+        Aid { with: None, calls: Vec::new(), given_up: Vec::new() }
     }
 
     /// Whom to ask, if there is anybody, and a request with a number of its own.
@@ -122,7 +125,7 @@ impl<'a> Aid<'a> {
         let mut set = vec![false; scene.grid.len()];
         pixels.iter().for_each(|&pixel| set[pixel] = true);
         let Some(mask) = PixelSupport::from_mask(&set, scene.grid.width) else { return };
-        if let Some(answer) = tools.recognise(&request, &mask, context.library) {
+        if let Some(answer) = self.still("recognise", || tools.recognise(&request, &mask, context.library)) {
             let said: Option<Vec<(String, f64)>> = answer
                 .outcome
                 .value()
@@ -155,11 +158,12 @@ impl<'a> Aid<'a> {
         let pose = beliefs::pose(best, fitted, context.config);
         let params = beliefs::params(best, fitted, evidence, mask.count);
         let part = |values| PartView { mask, template: best.model.template, values };
-        let measured_by_tool = tools.params(&request, &part(&params.mean), Some(&params));
+        let measured_by_tool = self.still("params", || tools.params(&request, &part(&params.mean), Some(&params)));
         let values = measured_by_tool.as_ref().and_then(|answer| answer.outcome.value()).map(|belief| &belief.mean);
         let begin = values.unwrap_or(&params.mean).clone();
-        let placed_by_tool =
-            self.request().and_then(|(tools, request)| tools.pose(&request, &part(&begin), Some(&pose)));
+        let placed_by_tool = self
+            .request()
+            .and_then(|(tools, request)| self.still("pose", || tools.pose(&request, &part(&begin), Some(&pose))));
         let place = placed_by_tool.as_ref().and_then(|answer| answer.outcome.value()).map(|belief| belief.pose);
         let made = match (values, place) {
             (None, None) => "geometry's fit".to_owned(),
@@ -180,8 +184,22 @@ impl<'a> Aid<'a> {
         }
     }
 
+    /// What a question brings, unless it was given up.
+    fn still<T>(&self, asked: &'static str, ask: impl FnOnce() -> Option<T>) -> Option<T> {
+        if self.given_up.contains(&asked) { None } else { ask() }
+    }
+
     fn note<T>(&mut self, asked: &'static str, answer: &Answer<T>, used: &str, unused: &str) {
-        let made = if answer.outcome.value().is_some() { used } else { unused };
+        let lost =
+            matches!(answer.outcome, Outcome::Failed(ToolError::TimedOut { .. } | ToolError::Unreachable { .. }));
+        let made = match answer.outcome.value() {
+            Some(_) => used.to_owned(),
+            None if lost => format!("{unused}, and not asked again in this frame"),
+            None => unused.to_owned(),
+        };
+        if lost {
+            self.given_up.push(asked);
+        }
         self.calls.push(ToolCall::new(asked, answer, made));
     }
 }

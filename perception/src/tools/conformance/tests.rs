@@ -1,5 +1,5 @@
 use super::*;
-use crate::tools::{Identity, PoseEstimator as _};
+use crate::tools::Identity;
 
 fn trial() -> Trial {
     Trial::new().unwrap()
@@ -87,6 +87,16 @@ fn masks_take_the_place_of_segments_and_partial_ones_stand_beside_them() {
     };
     assert_eq!(ground(false), (vec!["can".into()], "1 of 1 masks, those that stand on the surface".into()));
     assert_eq!(ground(true).0, ["block", "can"]);
+}
+
+#[test]
+fn a_tool_that_hangs_costs_its_deadline_once_a_frame() {
+    let trial = trial();
+    let tools = Faulty::tools(Geometric::new(grounder(&trial)), Fault::Late);
+    let calls = grounder(&trial).with_tools(tools).ground(&trial.frame, &Expectation::default()).calls;
+    let asked: Vec<&str> = calls.iter().map(|call| call.asked).collect();
+    assert_eq!(asked, ["detect", "segment", "recognise", "params", "pose"]);
+    assert!(calls[4].made.ends_with("not asked again in this frame"), "{calls:?}");
 }
 
 /// A pose estimator that is sure of a place 6 cm off.
