@@ -204,29 +204,32 @@ impl<'a> Aid<'a> {
     }
 }
 
-/// Puts a tool's masks in place of segments; `beside` keeps what they leave uncovered. Says how many counted.
+/// Puts a tool's masks in place of segments; `beside` keeps what they leave uncovered. Says how many counted: if none
+/// does, the tool saw nothing of what stands here, and geometry's segments stay.
 fn lay(scene: &Scene, masks: &[Mask], beside: bool, segments: &mut Segments) -> String {
-    if !beside {
-        segments.labels.fill(NONE);
-        segments.count = 0;
-    }
-    let mut taken = 0;
-    for mask in masks {
+    let stands = |mask: &Mask| {
         let pixels = mask.support.indices();
         let standing: Vec<usize> = pixels.iter().copied().filter(|&pixel| scene.rising[pixel]).collect();
         // Where nothing was measured nothing speaks against a mask.
         let known = pixels.iter().filter(|&&pixel| scene.is_known(pixel)).count();
-        let stands = standing.len() as f64 >= STANDING * known as f64;
-        if !stands || standing.len() < scene.config.min_segment_px {
-            continue;
-        }
+        let counts = standing.len() as f64 >= STANDING * known as f64 && standing.len() >= scene.config.min_segment_px;
+        counts.then_some(standing)
+    };
+    let things: Vec<Vec<usize>> = masks.iter().filter_map(stands).collect();
+    if things.is_empty() {
+        return format!("geometry's segments: none of {} masks stands on the surface", masks.len());
+    }
+    if !beside {
+        segments.labels.fill(NONE);
+        segments.count = 0;
+    }
+    for thing in &things {
         let label = segments.count as u32;
-        standing.iter().for_each(|&pixel| segments.labels[pixel] = label);
+        thing.iter().for_each(|&pixel| segments.labels[pixel] = label);
         segments.count += 1;
-        taken += 1;
     }
     // What is left of a segment that a mask cut into may be a sliver.
     let kept: Vec<bool> = segments.pixels().iter().map(|pixels| pixels.len() >= scene.config.min_segment_px).collect();
     segments.keep(&kept);
-    format!("{taken} of {} masks, those that stand on the surface", masks.len())
+    format!("{} of {} masks, those that stand on the surface", things.len(), masks.len())
 }

@@ -72,12 +72,13 @@ impl Trial {
             bodies.push((placed, *color));
         }
         let (frame, owners) = render(&header, &bodies);
-        let thing = |(index, (template, values, pose, _)): (usize, (&'static str, Vec<f64>, Pose, [u8; 3]))| {
+        let mut found = Vec::new();
+        for (index, (template, values, pose, _)) in things.into_iter().enumerate() {
             let set: Vec<bool> = owners.iter().map(|owner| *owner == Some(index)).collect();
-            let mask = PixelSupport::from_mask(&set, SIZE.0 as usize)?;
-            Some(Thing { template, values, pose, mask })
-        };
-        Ok(Trial { library, frame, things: things.into_iter().enumerate().filter_map(thing).collect() })
+            let mask = PixelSupport::from_mask(&set, SIZE.0 as usize);
+            found.extend(mask.map(|mask| Thing { template, values, pose, mask }));
+        }
+        Ok(Trial { library, frame, things: found })
     }
 
     /// The template of a thing.
