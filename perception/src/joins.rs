@@ -15,9 +15,14 @@ use std::collections::BTreeSet;
 /// Most joins in one frame.
 const MAX_JOINS: usize = 24;
 /// Colours of the parts of one thing that are joined by their shape differ by less, in the units of a tint.
-const SAME_TINT: f32 = 12.0;
+const SAME_TINT: f32 = 20.0;
 /// Parts of one thing that do not touch in the image are nearer to each other than this.
 const NEAR_M: f64 = 0.02;
+/// Share of a fringe's outline along which the thing cuts it off, and of its pixels that are two from its border.
+const FRINGE_CUT: f64 = 0.3;
+const FRINGE_THICK: f64 = 0.1;
+/// Evidence (negative log likelihood) that it takes to believe that two things lie like the parts of one.
+const COINCIDENCE: f64 = 15.0;
 /// Tops of pieces of one thing are level within this.
 const LEVEL_M: f64 = 0.016;
 
@@ -124,7 +129,7 @@ fn related(
                 continue;
             }
             let holds = match relation {
-                Relation::Artefact => is_ramp_of(a, b),
+                Relation::Artefact => is_ramp_of(a, b) || is_fringe_of(scene, a, b),
                 Relation::Floor => is_floor_of(a, b),
                 Relation::Surface => is_fragment_of(scene, a, b),
                 Relation::Inside => is_inside_of(scene, segments, context, a, b),
@@ -144,6 +149,20 @@ fn related(
 fn is_ramp_of(whole: &Piece, ramp: &Piece) -> bool {
     let touches = ramp.evidence.border_share(whole.label, &[OutlineKind::Contact, OutlineKind::Cut]);
     touches > 0.2 && ramp.top_m < 0.014_f64.min(0.3 * whole.top_m) && ramp.pixels.len() * 10 < whole.pixels.len()
+}
+
+/// Whether `fringe` is the band of depths between a thing and what is behind it that a depth camera draws along an edge:
+/// nowhere thick, and cut off by the thing along one side.
+fn is_fringe_of(scene: &Scene, whole: &Piece, fringe: &Piece) -> bool {
+    if fringe.pixels.len() * 10 > whole.pixels.len()
+        || fringe.evidence.border_share(whole.label, &[OutlineKind::Cut]) < FRINGE_CUT
+    {
+        return false;
+    }
+    let mut mask = vec![false; scene.grid.len()];
+    fringe.pixels.iter().for_each(|&pixel| mask[pixel] = true);
+    let thick = scene.grid.erode(&mask, 2).into_iter().filter(|inside| *inside).count();
+    (thick as f64) < FRINGE_THICK * fringe.pixels.len() as f64
 }
 
 /// Whether `floor` lies within `outer`: bordered by it nearly all round, by nothing farther, and lower.
@@ -213,7 +232,9 @@ fn is_one_with(scene: &Scene, segments: &Segments, context: Context, a: &Piece, 
     }
     let joint = union(scene, segments, a, b, false);
     let Some(comparison) = compare(context, &joint, a, b) else { return false };
-    comparison.together < comparison.apart
+    // Two things seldom lie as the parts of one do.
+    let coincidence = if comparison.solids > 1 { COINCIDENCE } else { 0.0 };
+    comparison.together < comparison.apart + coincidence
         && comparison.on_surface > 0.93
         && comparison.on_outline > 0.85
         && (touching || comparison.solids > 1)
