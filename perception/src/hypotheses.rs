@@ -343,7 +343,10 @@ impl Hypothesis<'_> {
             .filter(|(_, p)| p.kind == OutlineKind::Own)
             .map(|(r, p)| r.abs() < EXPLAINED.max(EXPLAINED_PX / p.sigma_px))
             .collect();
-        (share(points.iter().filter(fits).count(), points.len()), share(own.iter().filter(|fits| **fits).count(), own.len()))
+        (
+            share(points.iter().filter(fits).count(), points.len()),
+            share(own.iter().filter(|fits| **fits).count(), own.len()),
+        )
     }
 }
 

@@ -195,7 +195,7 @@ impl PartRecogniser for HttpTool {
 impl PoseEstimator for HttpTool {
     fn pose(&self, request: &Request, part: &PartView, prior: Option<&PoseBelief>) -> Outcome<PoseBelief> {
         let camera = request.frame.header.camera_pose;
-        let prior = prior.map(|belief| WirePose::of(belief, &camera));
+        let prior = prior.map(|belief| Box::new(WirePose::of(belief, &camera)));
         match WirePart::of(part) {
             Ok(wire) => {
                 let about = About::Pose { mask: &part.mask.runs, part: wire, prior };

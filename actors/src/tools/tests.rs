@@ -35,7 +35,7 @@ fn every_request_keeps_to_its_schema() {
         About::Detect { nouns: &nouns },
         About::Segment { nouns: &nouns, boxes: vec![[1, 2, 3, 4]] },
         About::Recognise { mask, templates: templates(&trial.library) },
-        About::Pose { mask, part: wire(), prior: Some(prior) },
+        About::Pose { mask, part: wire(), prior: Some(Box::new(prior)) },
         About::Params { mask, part: wire(), prior: Some(&params) },
         About::Params { mask, part: wire(), prior: None },
     ];

@@ -37,7 +37,7 @@ pub enum About<'a> {
     Detect { nouns: &'a [String] },
     Segment { nouns: &'a [String], boxes: Vec<[u32; 4]> },
     Recognise { mask: &'a [u32], templates: Vec<WireTemplate<'a>> },
-    Pose { mask: &'a [u32], part: WirePart<'a>, prior: Option<WirePose> },
+    Pose { mask: &'a [u32], part: WirePart<'a>, prior: Option<Box<WirePose>> },
     Params { mask: &'a [u32], part: WirePart<'a>, prior: Option<&'a ParamBelief> },
 }
 
@@ -180,7 +180,7 @@ impl WirePose {
     fn belief(self, camera: &Pose) -> Result<PoseBelief, ToolError> {
         // Written with few digits it may be a little off one.
         let length = self.rotation.length();
-        if !((length - 1.0).abs() < 1e-3) {
+        if length.is_nan() || (length - 1.0).abs() > 1e-3 {
             return Err(ToolError::invalid(
                 "pose.rotation",
                 format!("has length {length}, but a rotation has length 1"),
