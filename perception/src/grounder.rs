@@ -14,7 +14,7 @@ use crate::{
     config::GrounderConfig,
     expected::{self, Remembered},
     fit::{Base, Evidence},
-    hypotheses::{self, Context, Measured},
+    hypotheses::{self, Context, Hypothesis, Measured},
     own, patches,
     scan::Scan,
     scene::Scene,
@@ -167,15 +167,10 @@ impl Grounder {
         pieces.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         for (lowest_m, pixels, evidence) in pieces {
             let plan: Vec<DVec2> = evidence.points.iter().map(|p| p.position.truncate()).collect();
-            let base = bodies.base_under(&plan, lowest_m, &evidence);
-            let bottom = match base {
-                Base::At(height) | Base::Free(height) => height,
-            };
-            let height_m = evidence.top_m() - bottom;
-            let measured = Measured { plan, height_m, base, seen_by: SeenBy::Depth };
             let context = context(remembered.at(&pixels, SeenBy::Depth));
-            let mut ranked = hypotheses::rank(context, &measured, &evidence);
-            aid.advise(scene, context, &measured, &evidence, &pixels, &mut ranked);
+            let base = bodies.base_under(&plan, lowest_m, &evidence);
+            let mut ranked = rank_on(context, &plan, &evidence, base);
+            aid.advise(scene, context, &evidence, &pixels, &mut ranked);
             if let Some(object) = assemble::object(scene, context, &ranked, &evidence, &pixels, 1.0) {
                 bodies.add(&ranked);
                 objects.push(object);
@@ -183,6 +178,27 @@ impl Grounder {
         }
         objects
     }
+}
+
+/// The templates that can explain a segment on a base. What seems to hang in the air may hide what it stands on, and is
+/// tried on the plane too.
+fn rank_on<'a>(context: Context<'a>, plan: &[DVec2], evidence: &Evidence, base: Base) -> Vec<Hypothesis<'a>> {
+    let rank = |base: Base| {
+        let (Base::At(bottom) | Base::Free(bottom)) = base;
+        let height_m = evidence.top_m() - bottom;
+        let measured = Measured { plan: plan.to_vec(), height_m, base, seen_by: SeenBy::Depth };
+        hypotheses::rank(context, &measured, evidence)
+    };
+    match base {
+        free @ Base::Free(_) => better(rank(free), rank(Base::At(0.0))),
+        base => rank(base),
+    }
+}
+
+/// The ranking whose best hypothesis is the more probable.
+fn better<'a>(a: Vec<Hypothesis<'a>>, b: Vec<Hypothesis<'a>>) -> Vec<Hypothesis<'a>> {
+    let best = |ranked: &[Hypothesis]| ranked.first().map_or(f64::NEG_INFINITY, |first| first.score);
+    if best(&b) > best(&a) { b } else { a }
 }
 
 fn support_plane(scene: &Scene, plane: &Plane) -> SupportPlane {

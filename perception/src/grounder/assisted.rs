@@ -3,7 +3,7 @@
 use super::{Grounder, assemble, beliefs};
 use crate::{
     fit::Evidence,
-    hypotheses::{Context, Hypothesis, Measured, advised},
+    hypotheses::{Context, Hypothesis, advised},
     scene::Scene,
     segments::{NONE, Segments},
     tools::{Answer, Mask, Outcome, PartView, Prompts, Request, ToolCall, ToolError, Tools},
@@ -111,7 +111,6 @@ impl<'a> Aid<'a> {
         &mut self,
         scene: &Scene,
         context: Context,
-        measured: &Measured,
         evidence: &Evidence,
         pixels: &[usize],
         ranked: &mut [Hypothesis],
@@ -133,16 +132,14 @@ impl<'a> Aid<'a> {
             said.iter().for_each(|said| advised::weigh(ranked, said));
             self.note("recognise", &answer, "odds of the templates", "geometry's odds");
         }
-        self.start(scene, context, measured, evidence, &mask, pixels, ranked);
+        self.start(scene, context, evidence, &mask, pixels, ranked);
     }
 
     /// One more start of the best template's fit, where the tools place or measure it.
-    #[expect(clippy::too_many_arguments, reason = "a segment as the pipeline holds it")]
     fn start(
         &mut self,
         scene: &Scene,
         context: Context,
-        measured: &Measured,
         evidence: &Evidence,
         mask: &PixelSupport,
         pixels: &[usize],
@@ -169,7 +166,7 @@ impl<'a> Aid<'a> {
             (None, None) => "geometry's fit".to_owned(),
             (_, place) => {
                 let start = (begin.as_slice(), &place.unwrap_or(pose.pose));
-                match advised::restart(scene, measured, evidence, ranked, start) {
+                match advised::restart(scene, evidence, ranked, start) {
                     Ok(true) => "a better fit".into(),
                     Ok(false) => "a start that fits no better".into(),
                     Err(reason) => format!("no start: {reason}"),

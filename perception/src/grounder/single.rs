@@ -1,10 +1,10 @@
 //! One step of the pipeline by itself: the masks of a frame, and what one mask is. The geometric tools are made of this.
 
-use super::{Grounder, assemble, bases::Bodies, beliefs};
+use super::{Grounder, assemble, bases::Bodies, beliefs, rank_on};
 use crate::{
     expected::Remembered,
-    fit::{Base, Evidence},
-    hypotheses::{self, Context, Measured},
+    fit::Evidence,
+    hypotheses::Context,
     joins,
     scene::Scene,
     segments::{self, NONE, Segments},
@@ -14,7 +14,7 @@ use acm_concept::{
     camera::RgbdFrame,
     expectation::Expectation,
     object::{Blindness, PixelSupport, SupportPlane},
-    template::{SeenBy, TemplateLibrary},
+    template::TemplateLibrary,
 };
 use glam::DVec2;
 
@@ -85,10 +85,8 @@ impl Grounder {
         let evidence = Evidence::of_segment(scene, &segments, &pixels);
         let plan: Vec<DVec2> = evidence.points.iter().map(|p| p.position.truncate()).collect();
         let base = Bodies::default().base_under(&plan, scene.lowest_m(&pixels), &evidence);
-        let (Base::At(bottom) | Base::Free(bottom)) = base;
-        let measured = Measured { plan, height_m: evidence.top_m() - bottom, base, seen_by: SeenBy::Depth };
         let context = self.context(&[], library);
-        let ranked = hypotheses::rank(context, &measured, &evidence);
+        let ranked = rank_on(context, &plan, &evidence, base);
         let best = ranked.first().ok_or(Refusal::NothingFits)?;
         let object = assemble::object(scene, context, std::slice::from_ref(best), &evidence, &pixels, 1.0);
         let object = object.ok_or(Refusal::NothingFits)?;

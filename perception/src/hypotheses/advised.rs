@@ -1,6 +1,6 @@
 //! What tools say of a segment, weighed against geometry: odds of templates, and one more start of the fit.
 
-use super::{Hypothesis, Measured, canonical};
+use super::{Hypothesis, canonical};
 use crate::{
     fit::{Evidence, Model, approach, minimise},
     scene::Scene,
@@ -40,7 +40,6 @@ fn normalise(ranked: &mut [Hypothesis]) {
 /// Returns whether that is the new one, or why the start is none.
 pub(crate) fn restart(
     scene: &Scene,
-    measured: &Measured,
     evidence: &Evidence,
     ranked: &mut [Hypothesis],
     (values, pose): (&[f64], &Pose),
@@ -57,7 +56,7 @@ pub(crate) fn restart(
     if !upright && rest.is_none() {
         return Err("a stance in which the template neither stands nor rests".into());
     }
-    let Some(model) = Model::new(template, values.to_vec(), measured.base) else {
+    let Some(model) = Model::new(template, values.to_vec(), best.model.base) else {
         return Err("values at which the template has no symmetry".into());
     };
     let model = model.lying(rest);
@@ -69,7 +68,8 @@ pub(crate) fn restart(
     }
     let misfit = best.minimum.cost / (0.5 * evidence.independent()).max(1.0);
     let gain = ((best.minimum.cost - minimum.cost) / misfit.max(1.0)).min(MOST_SAID);
-    *best = Hypothesis { model, minimum, probability: best.probability * gain.exp(), tracked: None };
+    let score = best.score + best.minimum.cost - minimum.cost;
+    *best = Hypothesis { model, minimum, score, probability: best.probability * gain.exp(), tracked: None };
     normalise(ranked);
     Ok(true)
 }
