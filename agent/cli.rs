@@ -280,6 +280,10 @@ pub struct PerceiveArgs {
     /// A text file with a line `STEM x y z qx qy qz qw` for every frame; `#` begins a comment.
     #[arg(long, value_name = "FILE", conflicts_with = "camera_pose")]
     pub camera_poses: Option<PathBuf>,
+    /// What perception goes by: a TOML file with `[perception]` and `[tools]`, such as `[tools]` with
+    /// `segmenter = "http://127.0.0.1:8765"` (docs/perception-tools.md).
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
     /// Keep what is seen in this memory folder, and go on with what it holds.
     #[arg(long, value_name = "DIR")]
     pub memory: Option<PathBuf>,

@@ -15,6 +15,7 @@
 //! | [`demo`] | `acm demo`: the first minute |
 //! | [`perceive`] | `acm perceive`: real frames, no simulator |
 //! | [`mod@bench`] | `acm bench`: figures beside what they are to reach |
+//! | [`tools`] | the tools of perception that a user names, opened |
 //! | [`scenario`], [`library`], [`doctor`] | `acm scenario`, `acm library`, `acm doctor` |
 //! | [`trace`] | `acm trace`: a run written down, and looked into |
 //! | [`video`] | `acm run --video`: an episode as moving pictures |
@@ -40,6 +41,7 @@ pub mod run;
 pub mod scenario;
 pub mod serve;
 pub mod statistics;
+pub mod tools;
 pub mod trace;
 pub mod video;
 pub mod words;

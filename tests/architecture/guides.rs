@@ -146,6 +146,21 @@ fn the_gallery_shows_the_library_as_it_is() -> Result<()> {
 }
 
 #[test]
+fn the_tools_guide_shows_settings_that_are_read_and_names_every_field() -> Result<()> {
+    let guide = read(&root().join("docs/perception-tools.md"))?;
+    let example = blocks(&guide, "toml").first().copied().context("docs/perception-tools.md has no example")?;
+    let settings: acm_actors::settings::Settings = toml::from_str(example)?;
+    settings.tools.check().map_err(anyhow::Error::msg)?;
+    assert_eq!(settings.tools.named().count(), 2);
+    let named = table_names(&guide, "## Switching one on")?;
+    let text: Vec<String> = named.iter().filter(|name| **name != "deadline_ms").map(|n| format!("{n} = 'x'")).collect();
+    let all: acm_actors::tools::ToolSettings = toml::from_str(&text.join("\n"))?;
+    let fields: BTreeSet<&str> = all.named().map(|(field, _)| field).chain(["deadline_ms"]).collect();
+    assert_eq!((named, fields.len()), (fields.clone(), 6));
+    Ok(())
+}
+
+#[test]
 fn every_function_kind_is_described() -> Result<()> {
     let guide = read(&root().join("docs/templates.md"))?;
     let known: BTreeSet<&str> = acm_skills::kinds().iter().copied().collect();

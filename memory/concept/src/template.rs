@@ -428,6 +428,10 @@ impl TemplateLibrary {
         }
         Ok(TemplateLibrary { templates })
     }
+    /// The library of one template.
+    pub fn of_one(template: Template) -> TemplateLibrary {
+        TemplateLibrary { templates: BTreeMap::from([(template.name.clone(), template)]) }
+    }
     /// A template by type.
     pub fn get(&self, name: &str) -> Option<&Template> {
         self.templates.get(name)
