@@ -197,7 +197,7 @@ fn is_inside_of(scene: &Scene, segments: &Segments, context: Context, outer: &Pi
     let solids = best.model.solids(&best.minimum.state);
     let depth: Vec<f64> = inner.evidence.points.iter().map(|p| outside_m(&solids, p.position)).collect();
     let share = |limit: f64| depth.iter().filter(|d| **d < limit).count() as f64 / depth.len() as f64;
-    on_outline > 0.5 && share(0.002) > 0.6 && share(0.012) > 0.8
+    on_outline > 0.4 && share(0.002) > 0.6 && share(0.012) > 0.8
 }
 
 /// Whether two pieces are the ends of one thing that a nearer one covers in the middle: one solid explains both

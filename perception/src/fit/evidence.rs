@@ -63,6 +63,8 @@ const EDGE_INSIDE: isize = 3;
 const EDGE_OUTSIDE: isize = 6;
 const EDGE_SPREAD_PX: f64 = 2.5;
 const EDGE_CONTRAST: f64 = 9.0;
+/// What speaks against an edge counts for so much at most (log likelihood).
+const EDGE_DOUBT: f64 = 3.0;
 /// How far the other side of a hole is looked for, pixels.
 const HOLE_REACH: usize = 32;
 
@@ -173,14 +175,18 @@ fn color_edge(scene: &Scene, pixel: usize, dx: isize, dy: isize) -> Option<f64> 
     };
     let gaps: Vec<f64> = (1..SPAN - 2).map(contrast).collect();
     let away = |at: usize| at as f64 + 0.5 - EDGE_INSIDE as f64;
-    // What lies beyond it goes on beyond it, unlike the next colour of a pattern; a shadow may fall there.
-    let far = SPAN - 2;
-    let beyond = |at: usize| -> f64 {
-        let difference = |c: usize| 0.5 * (lab[at + 2][c] + lab[at + 3][c] - lab[far][c] - lab[far + 1][c]);
+    // Of two samples of two pixels each; the light may change, as in a shadow.
+    let unlike = |a: usize, b: usize| -> f64 {
+        let difference = |c: usize| 0.5 * (lab[a][c] + lab[a + 1][c] - lab[b][c] - lab[b + 1][c]);
         f64::from((0.3 * difference(0)).powi(2) + difference(1).powi(2) + difference(2).powi(2)).sqrt()
     };
+    // What lies beyond it goes on beyond it, unlike the next colour of a pattern, and what lies within is of the segment,
+    // unlike a mat that the thing stands on.
+    let beyond = |at: usize| unlike(at + 2, SPAN - 2);
+    let within = |at: usize| (0..EDGE_INSIDE as usize).map(|own| unlike(at, own)).fold(f64::INFINITY, f64::min);
+    let doubt = |at: usize| (beyond(at) / EDGE_CONTRAST).min(EDGE_DOUBT) + (within(at) / EDGE_CONTRAST).min(EDGE_DOUBT);
     let near = |at: usize| (-0.5 * ((away(at) - 0.5) / EDGE_SPREAD_PX).powi(2)).exp();
-    let likely = |at: usize| gaps[at] * near(at) * (-beyond(at) / EDGE_CONTRAST).exp();
+    let likely = |at: usize| gaps[at] * near(at) * (-doubt(at)).exp();
     let best = (0..gaps.len()).max_by(|a, b| likely(*a).total_cmp(&likely(*b)))?;
     if gaps[best] < EDGE_CONTRAST {
         return None;
