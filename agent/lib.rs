@@ -15,6 +15,7 @@
 //! | [`demo`] | `acm demo`: the first minute |
 //! | [`perceive`] | `acm perceive`: real frames, no simulator |
 //! | [`mod@bench`] | `acm bench`: figures beside what they are to reach |
+//! | `learn` | `acm learn`: the learned estimator (feature `learned`) |
 //! | [`scenario`], [`doctor`] | `acm scenario`, `acm doctor` |
 //! | [`trace`] | `acm trace`: a run written down, and looked into |
 //! | [`video`] | `acm run --video`: an episode as moving pictures |
@@ -30,6 +31,8 @@ pub mod doctor;
 pub mod embed;
 pub mod episode;
 pub mod inject;
+#[cfg(feature = "learned")]
+pub mod learn;
 pub mod live;
 pub mod llm;
 pub mod narrate;

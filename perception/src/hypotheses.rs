@@ -1,6 +1,7 @@
 //! Which template a segment is: every template is fitted and the fits are ranked by penalised likelihood, the
 //! template's prior and the words of the instruction.
 
+pub(crate) mod given;
 mod tipped;
 
 use crate::{
