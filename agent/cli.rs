@@ -413,6 +413,9 @@ pub struct PerceptionArgs {
     /// Draw every rendered scene into this folder: what was reported, red outlines of the truth, what became of each thing.
     #[arg(long, value_name = "DIR")]
     pub pictures: Option<PathBuf>,
+    /// Draw the rendered scenes from this seed on instead of the suite's own: to work on others than are reported.
+    #[arg(long, value_name = "N")]
+    pub seed_from: Option<u64>,
 }
 
 /// Arguments of `acm bench world`.

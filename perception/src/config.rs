@@ -49,6 +49,8 @@ pub struct GrounderConfig {
     pub max_fit_outline: usize,
     /// Spread of outline points round the true outline, pixels.
     pub outline_sigma_px: f64,
+    /// The same where the colour shows the outline.
+    pub color_edge_sigma_px: f64,
     /// Factor on the odds of a template that carries a noun of the instruction.
     pub noun_boost: f64,
     /// Factor on the odds of the template under which memory knows the thing.
@@ -87,6 +89,7 @@ impl Default for GrounderConfig {
             max_fit_points: 320,
             max_fit_outline: 140,
             outline_sigma_px: 1.5,
+            color_edge_sigma_px: 0.8,
             noun_boost: 4.0,
             memory_boost: 1.5,
             sigma_factor: 1.7,
@@ -116,6 +119,7 @@ impl GrounderConfig {
             ("patch_contrast", f64::from(self.patch_contrast)),
             ("min_patch_m", self.min_patch_m),
             ("outline_sigma_px", self.outline_sigma_px),
+            ("color_edge_sigma_px", self.color_edge_sigma_px),
             ("noun_boost", self.noun_boost),
             ("memory_boost", self.memory_boost),
             ("sigma_factor", self.sigma_factor),

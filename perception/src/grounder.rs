@@ -2,6 +2,7 @@
 
 mod assemble;
 mod bases;
+mod completion;
 
 use crate::{
     config::GrounderConfig,
@@ -71,6 +72,7 @@ impl Grounder {
         let remembered = Remembered::cast(&scene, camera_pose, &support, expectation, &self.library);
         let mut objects = self.objects(&scene, expectation, &remembered);
         objects.retain(|object| object.confidence >= self.config.min_confidence);
+        completion::complete(&scene, camera_pose, &self.library, &mut objects);
         objects.sort_by(|a, b| b.support.count.cmp(&a.support.count).then(a.support.runs.cmp(&b.support.runs)));
         objects.truncate(self.config.max_objects);
         expected::hint(&remembered, &mut objects, &self.library);

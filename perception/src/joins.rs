@@ -16,6 +16,11 @@ use std::collections::BTreeSet;
 const MAX_JOINS: usize = 24;
 /// Colours of the parts of one thing that are joined by their shape differ by less, in the units of a tint.
 const SAME_TINT: f32 = 12.0;
+/// Parts of one thing that do not touch in the image are nearer to each other than this.
+const NEAR_M: f64 = 0.02;
+/// Share of a fringe's outline along which the thing cuts it off, and of its pixels that are two from its border.
+const FRINGE_CUT: f64 = 0.3;
+const FRINGE_THICK: f64 = 0.1;
 /// Tops of pieces of one thing are level within this.
 const LEVEL_M: f64 = 0.016;
 
@@ -33,6 +38,16 @@ impl Piece {
         let evidence = Evidence::of_segment(scene, segments, &pixels);
         let (top_m, lowest_m) = (evidence.top_m(), scene.lowest_m(&pixels));
         (!evidence.points.is_empty()).then_some(Piece { label, pixels, evidence, top_m, lowest_m })
+    }
+    /// Least distance between some surface points of either, metres.
+    fn distance_m(&self, other: &Piece) -> f64 {
+        let some = |piece: &Piece| -> Vec<glam::DVec3> {
+            let step = (piece.evidence.points.len() / 100).max(1);
+            piece.evidence.points.iter().step_by(step).map(|p| p.position).collect()
+        };
+        let others = some(other);
+        let to = |at: glam::DVec3| others.iter().map(move |b| at.distance(*b)).fold(f64::INFINITY, f64::min);
+        some(self).into_iter().map(to).fold(f64::INFINITY, f64::min)
     }
     /// Share of the surface points near the top: large where a top face is seen, small on a wall.
     fn top_share(&self) -> f64 {
@@ -112,7 +127,7 @@ fn related(
                 continue;
             }
             let holds = match relation {
-                Relation::Artefact => is_ramp_of(a, b),
+                Relation::Artefact => is_ramp_of(a, b) || is_fringe_of(scene, a, b),
                 Relation::Floor => is_floor_of(a, b),
                 Relation::Surface => is_fragment_of(scene, a, b),
                 Relation::Inside => is_inside_of(scene, segments, context, a, b),
@@ -132,6 +147,20 @@ fn related(
 fn is_ramp_of(whole: &Piece, ramp: &Piece) -> bool {
     let touches = ramp.evidence.border_share(whole.label, &[OutlineKind::Contact, OutlineKind::Cut]);
     touches > 0.2 && ramp.top_m < 0.014_f64.min(0.3 * whole.top_m) && ramp.pixels.len() * 10 < whole.pixels.len()
+}
+
+/// Whether `fringe` is the band of depths between a thing and what is behind it that a depth camera draws along an edge:
+/// nowhere thick, and cut off by the thing along one side.
+fn is_fringe_of(scene: &Scene, whole: &Piece, fringe: &Piece) -> bool {
+    if fringe.pixels.len() * 10 > whole.pixels.len()
+        || fringe.evidence.border_share(whole.label, &[OutlineKind::Cut]) < FRINGE_CUT
+    {
+        return false;
+    }
+    let mut mask = vec![false; scene.grid.len()];
+    fringe.pixels.iter().for_each(|&pixel| mask[pixel] = true);
+    let thick = scene.grid.erode(&mask, 2).into_iter().filter(|inside| *inside).count();
+    (thick as f64) < FRINGE_THICK * fringe.pixels.len() as f64
 }
 
 /// Whether `floor` lies within `outer`: bordered by it nearly all round, by nothing farther, and lower.
@@ -191,18 +220,28 @@ fn is_one_with(scene: &Scene, segments: &Segments, context: Context, a: &Piece, 
     let either = [OutlineKind::Contact, OutlineKind::Cut, OutlineKind::Own];
     let touches = |piece: &Piece, other: &Piece| piece.evidence.border_share(other.label, &either) > 0.15;
     let tint = |piece: &Piece| Tint::of(&scene.scan.appearance(&piece.pixels).mean);
-    if a.label > b.label || !(touches(a, b) || touches(b, a)) || tint(a).distance(&tint(b)) > SAME_TINT {
+    if a.label > b.label || tint(a).distance(&tint(b)) > SAME_TINT {
+        return false;
+    }
+    // Parts that are apart in the image, as the jaws of what stands open, are near each other in space.
+    let touching = touches(a, b) || touches(b, a);
+    if !touching && a.distance_m(b) > NEAR_M {
         return false;
     }
     let joint = union(scene, segments, a, b, false);
     let Some(comparison) = compare(context, &joint, a, b) else { return false };
-    comparison.together < comparison.apart && comparison.on_surface > 0.93 && comparison.on_outline > 0.85
+    comparison.together < comparison.apart
+        && comparison.on_surface > 0.93
+        && comparison.on_outline > 0.85
+        && (touching || comparison.solids > 1)
 }
 
 /// What it costs to explain two pieces as one thing and as two, and how much the one explains.
 struct Comparison {
     together: f64,
     apart: f64,
+    /// Of which the one is made.
+    solids: usize,
     on_surface: f64,
     on_outline: f64,
 }
@@ -219,6 +258,7 @@ fn compare(context: Context, joint: &Evidence, a: &Piece, b: &Piece) -> Option<C
     Some(Comparison {
         together: penalty(&one, joint) * share.max(1.0),
         apart: penalty(&left, &a.evidence) + penalty(&right, &b.evidence),
+        solids: one.model.solids(&one.minimum.state).len(),
         on_surface,
         on_outline,
     })

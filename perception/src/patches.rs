@@ -23,9 +23,18 @@ pub(crate) struct Patch {
 /// Tints of one patch differ by less than this.
 const ALIKE: f32 = 14.0;
 
+/// From so many pieces on that fill a rectangle together they are one patch with a pattern; two may be two patches.
+const PATTERN_PIECES: usize = 3;
+/// What is joined fills its rectangle by more than this, and that is shorter than this.
+const FULL: f64 = 0.9;
+const LONGEST_M: f64 = 0.45;
+
 /// A common rectangle may be this much less full than its pieces' own: a gap of 1 cm between two mats of 8 cm
 /// takes three times as much.
 const JOINT_LOSS: f64 = 0.02;
+
+/// What is lighter than the surface by this much (CIELAB) has another colour; what is darker may lie in the shade.
+const LIGHTER: f32 = 14.0;
 
 /// How a pixel counts in the search for patches.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -46,16 +55,34 @@ pub(crate) fn find(scene: &Scene, standing: &[bool]) -> Vec<Patch> {
     let firm = scene.grid.dilate(&scene.grid.erode(&tinted, 1), 1);
     let mask: Vec<bool> = (0..tinted.len()).map(|i| tinted[i] && firm[i]).collect();
     let alike = |a: usize, b: usize| scene.scan.tint(a).distance(&scene.scan.tint(b)) < ALIKE;
-    let (labels, sizes) = scene.grid.components(&mask, alike);
-    let mut pieces: Vec<Vec<usize>> = vec![Vec::new(); sizes.len()];
-    for (index, &label) in labels.iter().enumerate() {
-        if sizes.get(label as usize).is_some_and(|size| *size >= scene.config.min_segment_px / 2) {
-            pieces[label as usize].push(index);
+    let mut pieces = connected(scene, &mask, alike);
+    for blob in connected(scene, &mask, |_, _| true) {
+        let colors = pieces.iter().filter(|piece| piece.iter().any(|at| blob.binary_search(at).is_ok())).count();
+        if colors >= PATTERN_PIECES && is_full(scene, &ground, &blob) {
+            pieces.retain(|piece| !piece.iter().any(|at| blob.binary_search(at).is_ok()));
+            pieces.push(blob);
         }
     }
-    pieces.retain(|pixels| !pixels.is_empty());
     join_pieces(scene, &ground, &mut pieces);
     pieces.into_iter().filter_map(|pixels| patch(scene, &ground, pixels)).collect()
+}
+
+/// Connected areas of a mask that are not too small, each ascending.
+fn connected(scene: &Scene, mask: &[bool], joined: impl Fn(usize, usize) -> bool) -> Vec<Vec<usize>> {
+    let (labels, sizes) = scene.grid.components(mask, joined);
+    let mut areas: Vec<Vec<usize>> = vec![Vec::new(); sizes.len()];
+    for (index, &label) in labels.iter().enumerate() {
+        if sizes.get(label as usize).is_some_and(|size| *size >= scene.min_segment_px() / 2) {
+            areas[label as usize].push(index);
+        }
+    }
+    areas.retain(|pixels| !pixels.is_empty());
+    areas
+}
+
+/// Whether an area fills a rectangle on the surface as a patch does.
+fn is_full(scene: &Scene, ground: &[Ground], pixels: &[usize]) -> bool {
+    rectangle(&plan(scene, pixels)).is_some_and(|r| r.length < LONGEST_M && fill(scene, ground, &r, pixels) > FULL)
 }
 
 fn classify(scene: &Scene, surface: &SurfaceTint, covered: &[bool], index: usize) -> Ground {
@@ -64,13 +91,16 @@ fn classify(scene: &Scene, surface: &SurfaceTint, covered: &[bool], index: usize
         return Ground::Unknown;
     }
     let distance = scene.scan.tint(index).distance(&surface.at(scene, index));
-    if distance > scene.config.patch_contrast { Ground::Tinted } else { Ground::Bare }
+    let lighter = scene.scan.lab[index][0] - surface.lightness_at(scene, index);
+    if distance > scene.config.patch_contrast || lighter > LIGHTER { Ground::Tinted } else { Ground::Bare }
 }
 
-/// The bare surface's tint as a plane over the image: white balance and light change slowly across it.
+/// The bare surface's tint and lightness as planes over the image: white balance and light change slowly across it.
 struct SurfaceTint {
     /// For a and b: constant, per column, per row (both from -1 to 1).
     coefficients: [nalgebra::Vector3<f32>; 2],
+    /// The same for the lightness of what is not in the shade.
+    lightness: nalgebra::Vector3<f32>,
 }
 
 impl SurfaceTint {
@@ -78,7 +108,7 @@ impl SurfaceTint {
         let pixels: Vec<usize> = (0..scene.grid.len()).step_by(5).filter(|&i| scene.in_plane[i]).collect();
         let mode = mode(&pixels.iter().map(|&i| scene.scan.tint(i)).collect::<Vec<_>>())?;
         let constant = |value: f32| nalgebra::Vector3::new(value, 0.0, 0.0);
-        let mut tint = SurfaceTint { coefficients: [constant(mode.a), constant(mode.b)] };
+        let mut tint = SurfaceTint { coefficients: [constant(mode.a), constant(mode.b)], lightness: constant(0.0) };
         for _ in 0..3 {
             let (mut matrix, mut right) = (nalgebra::Matrix3::zeros(), [nalgebra::Vector3::zeros(); 2]);
             for &pixel in &pixels {
@@ -95,7 +125,34 @@ impl SurfaceTint {
             let pull = |c: f32, sum| inverse * (sum + constant(10.0 * c));
             tint.coefficients = [pull(mode.a, right[0]), pull(mode.b, right[1])];
         }
+        tint.lightness = tint.lit(scene, &pixels)?;
         Some(tint)
+    }
+    /// The lightness of the bare surface: the middle of all, then a plane through what is near it.
+    fn lit(&self, scene: &Scene, pixels: &[usize]) -> Option<nalgebra::Vector3<f32>> {
+        let bare = |pixel: &&usize| {
+            scene.scan.tint(**pixel).distance(&self.at(scene, **pixel)) < 0.6 * scene.config.patch_contrast
+        };
+        let bare: Vec<usize> = pixels.iter().filter(bare).copied().collect();
+        let mut values: Vec<f32> = bare.iter().map(|&pixel| scene.scan.lab[pixel][0]).collect();
+        values.sort_by(f32::total_cmp);
+        let middle = values.get(values.len() / 2).copied()?;
+        let mut plane = nalgebra::Vector3::new(middle, 0.0, 0.0);
+        for _ in 0..3 {
+            let (mut matrix, mut right) = (nalgebra::Matrix3::identity() * 10.0, plane * 10.0);
+            for &pixel in &bare {
+                let (row, value) = (place(scene, pixel), scene.scan.lab[pixel][0]);
+                if (value - plane.dot(&row)).abs() < 0.6 * LIGHTER {
+                    matrix += row * row.transpose();
+                    right += row * value;
+                }
+            }
+            plane = matrix.try_inverse()? * right;
+        }
+        Some(plane)
+    }
+    fn lightness_at(&self, scene: &Scene, pixel: usize) -> f32 {
+        self.lightness.dot(&place(scene, pixel))
     }
     fn at(&self, scene: &Scene, pixel: usize) -> Tint {
         let row = place(scene, pixel);
@@ -161,13 +218,13 @@ fn join_pieces(scene: &Scene, ground: &[Ground], pieces: &mut Vec<Vec<usize>>) {
                 Vec::new()
             };
             let fullness = |pixels: &[usize]| {
-                rectangle(&plan(scene, pixels)).filter(|r| r.length < 0.45).map(|r| fill(scene, ground, &r, pixels))
+                rectangle(&plan(scene, pixels)).filter(|r| r.length < LONGEST_M).map(|r| fill(scene, ground, &r, pixels))
             };
             let fits = alike
                 && fullness(&joined)
                     .zip(fullness(&pieces[first]))
                     .zip(fullness(&pieces[second]))
-                    .is_some_and(|((joined, first), second)| joined > 0.9 && joined > first.min(second) - JOINT_LOSS);
+                    .is_some_and(|((joined, first), second)| joined > FULL && joined > first.min(second) - JOINT_LOSS);
             if fits {
                 pieces[first] = joined;
                 pieces.remove(second);
@@ -210,7 +267,7 @@ fn patch(scene: &Scene, ground: &[Ground], pixels: Vec<usize>) -> Option<Patch> 
     let plan = plan(scene, &pixels);
     let rectangle = rectangle(&plan)?;
     let fill = fill(scene, ground, &rectangle, &pixels);
-    if pixels.len() < scene.config.min_segment_px || rectangle.width < scene.config.min_patch_m || fill < 0.8 {
+    if pixels.len() < scene.min_segment_px() || rectangle.width < scene.config.min_patch_m || fill < 0.8 {
         return None;
     }
     let outline = outline(scene, ground, &pixels);

@@ -4,6 +4,9 @@ use crate::{config::GrounderConfig, grid::Grid, scan::Scan, support::Plane};
 use acm_concept::pose::Pose;
 use glam::{DQuat, DVec2, DVec3, Vec3};
 
+/// No thing has fewer pixels, however small the image.
+const FEW_PX: usize = 40;
+
 /// A frame with its support plane. The *support frame* is the world turned by the plane's small tilt and moved so
 /// that z is the height above the plane.
 pub(crate) struct Scene<'a> {
@@ -68,6 +71,12 @@ impl<'a> Scene<'a> {
     pub fn height_limit_m(&self, pixel: usize) -> f32 {
         let ripple = 0.006 * self.scan.smooth[pixel];
         self.config.min_height_m.max(3.0 * self.height_sigma_m[pixel]).max(ripple)
+    }
+    /// Fewest pixels of a thing: the configured number is one of a VGA image.
+    pub fn min_segment_px(&self) -> usize {
+        const VGA: usize = 640 * 480;
+        let scaled = self.config.min_segment_px * self.grid.len() / VGA;
+        scaled.clamp(FEW_PX.min(self.config.min_segment_px), self.config.min_segment_px)
     }
     /// Where the viewing ray of an image point meets the plane, support frame x and y.
     pub fn foot_of_ray(&self, pixel: DVec2) -> Option<DVec2> {

@@ -56,7 +56,7 @@ pub(crate) fn split(scene: &Scene) -> Segments {
     let joined =
         |a: usize, b: usize| (scene.scan.smooth[a] - scene.scan.smooth[b]).abs() < step_m(a) && !(bends[a] || bends[b]);
     let (mut labels, sizes) = scene.grid.components(&core, joined);
-    let least = scene.config.min_segment_px * 2 / 3;
+    let least = scene.min_segment_px() * 2 / 3;
     for label in &mut labels {
         if sizes.get(*label as usize).is_none_or(|size| *size < least) {
             *label = NONE;
@@ -198,7 +198,7 @@ fn adopt_remains(scene: &Scene, segments: &mut Segments) {
         let most = touches.get(&rest).and_then(|near| near.iter().max_by_key(|(_, count)| **count));
         match most {
             Some((segment, count)) if *count >= 5 => *segment,
-            _ if sizes[rest as usize] >= scene.config.min_segment_px => segments.count as u32 + rest,
+            _ if sizes[rest as usize] >= scene.min_segment_px() => segments.count as u32 + rest,
             _ => NONE,
         }
     };
@@ -268,7 +268,7 @@ fn borders(grid: Grid, scene: &Scene, normals: &[Vec3], segments: &Segments) -> 
 fn drop_small(scene: &Scene, segments: &mut Segments) {
     let pixels = segments.pixels();
     let is_thing = |list: &Vec<usize>| {
-        if list.len() < scene.config.min_segment_px {
+        if list.len() < scene.min_segment_px() {
             return false;
         }
         let mut heights: Vec<f32> = list.iter().map(|&i| scene.point[i].z / scene.height_limit_m(i)).collect();

@@ -46,7 +46,8 @@ use plan::{Plan, RowKind};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use scene::{Scene, Wanted};
-use std::{collections::BTreeMap, sync::Arc};
+use score::Fate;
+use std::{collections::BTreeMap, fs::OpenOptions, io::Write, path::Path, sync::Arc};
 use tally::Tally;
 use thing::Workshop;
 use view::{Eye, View};
@@ -158,7 +159,10 @@ impl Bench {
     /// `None`, and a row that says why, without a renderer.
     fn new(args: &PerceptionArgs, result: &mut BenchResult) -> anyhow::Result<Option<Bench>> {
         let library = Arc::new(acm_memory::default_library()?);
-        let plan = Plan::own(&library)?;
+        let mut plan = Plan::own(&library)?;
+        if let Some(first) = args.seed_from {
+            (plan.first_seed, plan.small_cubes.first_seed) = (first, first);
+        }
         let renderer = match Renderer::new() {
             Ok(renderer) => renderer,
             Err(error) => {
@@ -189,8 +193,23 @@ impl Bench {
             picture::draw(&view, &percepts, &scored.fates, &self.library)
                 .save(&path)
                 .with_context(|| format!("the picture {} cannot be written", path.display()))?;
+            self.list(folder, wanted, seed, &scene, &scored.fates)?;
         }
         Ok(scored.tally)
+    }
+
+    /// Adds to the table beside the pictures what became of each thing of a scene.
+    fn list(&self, folder: &Path, wanted: Wanted, seed: u64, scene: &Scene, fates: &[Fate]) -> anyhow::Result<()> {
+        let path = folder.join("fates.tsv");
+        let cannot = || format!("the table {} cannot be written", path.display());
+        let mut table = OpenOptions::new().create(true).append(true).open(&path).with_context(cannot)?;
+        for (at, (thing, fate)) in scene.things.iter().zip(fates).enumerate() {
+            let place = if thing.touches.is_some() { "touching" } else { "spaced" };
+            let kind = thing.template.as_ref().map_or("foreign", |truth| truth.template.as_str());
+            writeln!(table, "{}\t{seed}\t{at}\t{kind}\t{place}\t{}", wanted.kind.name(), fate.name())
+                .with_context(cannot)?;
+        }
+        Ok(())
     }
 
     /// What a fresh memory that took the first frame expects of the second.

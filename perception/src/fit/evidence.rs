@@ -55,6 +55,12 @@ pub(crate) struct Evidence {
 const CORRELATED_PX: f64 = 15.0;
 /// Outline pixels over which errors are about equal.
 const CORRELATED_OUTLINE_PX: f64 = 3.0;
+/// How far inside and outside of the border that the depth shows the colour's edge is looked for, pixels, how far from it
+/// one is still as likely, and which change of colour (CIELAB) makes an edge.
+const EDGE_INSIDE: isize = 3;
+const EDGE_OUTSIDE: isize = 6;
+const EDGE_SPREAD_PX: f64 = 2.5;
+const EDGE_CONTRAST: f64 = 9.0;
 /// How far the other side of a hole is looked for, pixels.
 const HOLE_REACH: usize = 32;
 
@@ -125,11 +131,62 @@ fn outline(scene: &Scene, segments: &Segments, pixels: &[usize]) -> Vec<OutlineP
             }
             let Some((kind, beyond, over_hole)) = other_side(scene, segments, label, pixel, dx, dy) else { continue };
             let at = DVec2::new(scene.grid.column(pixel) as f64, scene.grid.row(pixel) as f64);
-            let sigma_px = scene.config.outline_sigma_px * if over_hole { 1.7 } else { 1.0 };
-            points.push(OutlinePoint { pixel: at + DVec2::new(dx as f64, dy as f64) * 0.5, sigma_px, kind, beyond });
+            let outwards = DVec2::new(dx as f64, dy as f64);
+            // Where a nearer thing begins is no edge of this one.
+            let edge = if kind == OutlineKind::Cut { None } else { color_edge(scene, pixel, dx, dy) };
+            let point = match edge {
+                // The colour shows where it ends, also where it meets the surface.
+                Some(px) => OutlinePoint {
+                    pixel: at + outwards * px,
+                    sigma_px: scene.config.color_edge_sigma_px,
+                    kind: if beyond == NONE { OutlineKind::Own } else { kind },
+                    beyond,
+                },
+                None => {
+                    let sigma_px = scene.config.outline_sigma_px * if over_hole { 1.7 } else { 1.0 };
+                    OutlinePoint { pixel: at + outwards * 0.5, sigma_px, kind, beyond }
+                }
+            };
+            points.push(point);
         }
     }
     points
+}
+
+/// How far from a border pixel, in a direction out of its segment, the colour changes most, pixels; `None` if it hardly
+/// changes there. The border that the depth shows is ragged and lacks the foot, which no height tells from the surface.
+fn color_edge(scene: &Scene, pixel: usize, dx: isize, dy: isize) -> Option<f64> {
+    const SPAN: usize = (EDGE_INSIDE + EDGE_OUTSIDE + 3) as usize;
+    let mut lab = [[0f32; 3]; SPAN];
+    for (slot, value) in lab.iter_mut().enumerate() {
+        let step = slot as isize - EDGE_INSIDE - 1;
+        *value = scene.scan.lab[scene.grid.offset(pixel, dx * step, dy * step)?];
+    }
+    // Between the means of two pixels on either side of each gap: single ones are noisy.
+    let contrast = |slot: usize| -> f64 {
+        let difference = |c: usize| 0.5 * (lab[slot + 1][c] + lab[slot + 2][c] - lab[slot - 1][c] - lab[slot][c]);
+        f64::from((0..3).map(|c| difference(c).powi(2)).sum::<f32>().sqrt())
+    };
+    let gaps: Vec<f64> = (1..SPAN - 2).map(contrast).collect();
+    let away = |at: usize| at as f64 + 0.5 - EDGE_INSIDE as f64;
+    // What lies beyond it goes on beyond it, unlike the next colour of a pattern; a shadow may fall there.
+    let far = SPAN - 2;
+    let beyond = |at: usize| -> f64 {
+        let difference = |c: usize| 0.5 * (lab[at + 2][c] + lab[at + 3][c] - lab[far][c] - lab[far + 1][c]);
+        f64::from((0.3 * difference(0)).powi(2) + difference(1).powi(2) + difference(2).powi(2)).sqrt()
+    };
+    let near = |at: usize| (-0.5 * ((away(at) - 0.5) / EDGE_SPREAD_PX).powi(2)).exp();
+    let likely = |at: usize| gaps[at] * near(at) * (-beyond(at) / EDGE_CONTRAST).exp();
+    let best = (0..gaps.len()).max_by(|a, b| likely(*a).total_cmp(&likely(*b)))?;
+    if gaps[best] < EDGE_CONTRAST {
+        return None;
+    }
+    // The middle of the three gaps round it, by what each exceeds the lowest of them.
+    let near = best.saturating_sub(1)..(best + 2).min(gaps.len());
+    let least = near.clone().map(|at| gaps[at]).fold(f64::INFINITY, f64::min);
+    let (sum, weight) =
+        near.fold((0.0, 1e-9), |(sum, weight), at| (sum + (gaps[at] - least) * away(at), weight + gaps[at] - least));
+    Some(if weight > 1e-6 { sum / weight } else { away(best) })
 }
 
 /// What lies beyond a border pixel, which segment that is, and whether a hole had to be crossed; `None` if the
