@@ -5,8 +5,9 @@ mod table;
 use super::{Interrupt, cloud, estimate};
 use crate::{
     bench::{
+        BenchResult, Row,
         perception::suite::labelled::{Labelled, Studio, Views},
-        progress, write_json, BenchResult, Row,
+        progress, write_json,
     },
     cli::{Exit, learn::LearnCompareArgs},
 };
@@ -108,13 +109,11 @@ fn quantities<'a>(template: &'a Template, truth: &'a Estimate, learned: &Estimat
             Quantity { name: &spec.name, unit, error: Box::new(error), half_interval }
         })
         .collect();
-    let place =
-        |found: &Estimate| 1e3 * (found.pose.translation - truth.pose.translation).truncate().length();
+    let place = |found: &Estimate| 1e3 * (found.pose.translation - truth.pose.translation).truncate().length();
     quantities.push(Quantity { name: "place", unit: "mm", error: Box::new(place), half_interval: None });
     let symmetry = template.yaw_symmetry(&template.named(&truth.values)).unwrap_or(YawSymmetry::Fold(1));
     if symmetry != YawSymmetry::Continuous {
-        let heading =
-            move |found: &Estimate| symmetry.difference(found.pose.yaw(), truth.pose.yaw()).to_degrees();
+        let heading = move |found: &Estimate| symmetry.difference(found.pose.yaw(), truth.pose.yaw()).to_degrees();
         quantities.push(Quantity { name: "heading", unit: "deg", error: Box::new(heading), half_interval: None });
     }
     quantities

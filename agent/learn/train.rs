@@ -62,8 +62,8 @@ pub fn run(args: &LearnTrainArgs) -> anyhow::Result<Exit> {
     let bar = bar(plan.steps as u64);
     let (mut shown, mut steps, mut written) = (None, 0, Ok(()));
     train(&net, &samples, &plan, |progress| {
-        let before = shown.unwrap_or(progress.loss);
-        let loss = before + SMOOTH.max(1.0 / progress.step as f64) * (progress.loss - before);
+        let before = shown.unwrap_or(progress.nats);
+        let loss = before + SMOOTH.max(1.0 / progress.step as f64) * (progress.nats - before);
         shown = Some(loss);
         steps = progress.step;
         bar.set_position(progress.step as u64);

@@ -72,7 +72,7 @@ pub fn things(
     let segments = Segments { inner: vec![false; labels.len()], labels, count: bases_m.len() };
     let pixels = segments.pixels();
     let thing = |(pixels, base_m): (&Vec<usize>, &f64)| {
-        (pixels.len() >= config.min_segment_px).then(|| GivenThing::of(&scene, &segments, pixels, *base_m))
+        (pixels.len() >= scene.min_segment_px()).then(|| GivenThing::of(&scene, &segments, pixels, *base_m))
     };
     Ok(pixels.iter().zip(bases_m).map(thing).collect())
 }

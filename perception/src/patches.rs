@@ -218,7 +218,9 @@ fn join_pieces(scene: &Scene, ground: &[Ground], pieces: &mut Vec<Vec<usize>>) {
                 Vec::new()
             };
             let fullness = |pixels: &[usize]| {
-                rectangle(&plan(scene, pixels)).filter(|r| r.length < LONGEST_M).map(|r| fill(scene, ground, &r, pixels))
+                rectangle(&plan(scene, pixels))
+                    .filter(|r| r.length < LONGEST_M)
+                    .map(|r| fill(scene, ground, &r, pixels))
             };
             let fits = alike
                 && fullness(&joined)

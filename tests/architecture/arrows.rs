@@ -42,12 +42,8 @@ const MAY_NAME: [(&str, &[&str]); 13] = [
 ];
 
 /// Outside crates that belong to one of ours alone.
-const RESERVED: [(&str, &str); 4] = [
-    ("candle-core", "acm-learned"),
-    ("candle-nn", "acm-learned"),
-    ("rapier3d", "acm-sim"),
-    ("wgpu", "acm-render"),
-];
+const RESERVED: [(&str, &str); 4] =
+    [("candle-core", "acm-learned"), ("candle-nn", "acm-learned"), ("rapier3d", "acm-sim"), ("wgpu", "acm-render")];
 
 /// The agent's side: it sees frames and what an arm reports, and cannot name a simulator type.
 const AGENT_SIDE: [&str; 10] = [

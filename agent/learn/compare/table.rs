@@ -71,11 +71,7 @@ impl Errors {
         let pairs = || self.of(one).iter().zip(self.of(other));
         let (less, more) = (pairs().filter(|(a, b)| a < b).count(), pairs().filter(|(a, b)| a > b).count());
         let (low, high) = wilson95(less, less + more);
-        if low > 0.5 {
-            Some(one)
-        } else {
-            (high < 0.5).then_some(other)
-        }
+        if low > 0.5 { Some(one) } else { (high < 0.5).then_some(other) }
     }
 }
 
@@ -95,12 +91,9 @@ impl Table {
     ) {
         // Quantities keep the order in which they come.
         let known = self.0.iter().find(|((of, _), (name, _))| of == template && name == quantity);
-        let place = known.map_or_else(
-            || self.0.keys().filter(|(of, _)| of == template).count(),
-            |((_, place), _)| *place,
-        );
-        let (_, own) =
-            self.0.entry((template.into(), place)).or_insert_with(|| (quantity.into(), Errors::default()));
+        let place =
+            known.map_or_else(|| self.0.keys().filter(|(of, _)| of == template).count(), |((_, place), _)| *place);
+        let (_, own) = self.0.entry((template.into(), place)).or_insert_with(|| (quantity.into(), Errors::default()));
         own.unit = unit;
         if let (Some(half), Some(error)) = (half_interval, errors.get(&Way::Learned)) {
             own.inside.0 += usize::from(*error <= half);
@@ -223,7 +216,10 @@ mod tests {
             table.add("box", "heading", "deg", errors(error, other, error), None);
         }
         let [guess, fit, _] = &table.verdicts()[..] else { panic!("three verdicts") };
-        assert!(guess.contains("better is learned.") && guess.contains("in 2, geometric in 0; 1 are undecided"), "{guess}");
+        assert!(
+            guess.contains("better is learned.") && guess.contains("in 2, geometric in 0; 1 are undecided"),
+            "{guess}"
+        );
         assert!(fit.contains("better is neither") && fit.contains("3 are undecided"), "{fit}");
         let rows: Vec<_> = table.rows().collect();
         let names: Vec<&str> = rows.iter().map(|(name, _)| name.as_str()).collect();

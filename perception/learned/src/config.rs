@@ -178,7 +178,8 @@ impl Description {
             return Err(format!("head: there are {}, but must be 1 to {MOST}", self.heads.len()));
         }
         let empty = self.heads.iter().find(|head| head.parameters.is_empty() || head.parameters.len() > MOST);
-        empty.map_or(Ok(()), |head| Err(format!("head `{}`: parameters: there is none, or far too many", head.template)))
+        empty
+            .map_or(Ok(()), |head| Err(format!("head `{}`: parameters: there is none, or far too many", head.template)))
     }
 }
 

@@ -308,10 +308,7 @@ impl Layer {
             key: at.tensor("key.weight", &[width, width], spread)?,
             value,
             out,
-            norms: [
-                LayerNorm::new(width, &mut at.at("norm.0"))?,
-                LayerNorm::new(width, &mut at.at("norm.1"))?,
-            ],
+            norms: [LayerNorm::new(width, &mut at.at("norm.0"))?, LayerNorm::new(width, &mut at.at("norm.1"))?],
             perceptron: [
                 Linear::new(width, 4 * width, 1.0, &mut at.at("perceptron.0"))?,
                 Linear::new(4 * width, width, 0.5, &mut at.at("perceptron.1"))?,

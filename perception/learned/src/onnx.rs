@@ -7,8 +7,8 @@
 mod proto;
 
 use crate::{
-    config::{FolderError, HeadSpec},
     cloud::CONTEXT,
+    config::{FolderError, HeadSpec},
     estimator::Estimator,
     net::{EPSILON, LOG_DEVIATION},
 };

@@ -63,8 +63,7 @@ impl Samples {
         let tensors = self.tensors().map_err(|e| FolderError::format(&path, e))?;
         candle_core::safetensors::save(&tensors, &path).map_err(|e| FolderError::format(&path, e))?;
         let path = folder.join(DESCRIPTION_FILE);
-        let description =
-            SamplesDescription { schema: SCHEMA.into(), scenes: self.scenes, heads: self.heads.clone() };
+        let description = SamplesDescription { schema: SCHEMA.into(), scenes: self.scenes, heads: self.heads.clone() };
         let text = toml::to_string(&description).map_err(|e| FolderError::format(&path, e))?;
         std::fs::write(&path, text).map_err(|source| FolderError::file(&path, source))
     }
@@ -77,7 +76,8 @@ impl Samples {
         let counts: Vec<u32> = self.samples.iter().map(|s| s.points.len() as u32).collect();
         let context: Vec<f32> = self.samples.iter().flat_map(|s| s.context).collect();
         let heads: Vec<u32> = self.samples.iter().map(|s| s.head as u32).collect();
-        let filled = |s: &Sample| s.targets.iter().copied().chain(std::iter::repeat(0.0)).take(width).collect::<Vec<_>>();
+        let filled =
+            |s: &Sample| s.targets.iter().copied().chain(std::iter::repeat(0.0)).take(width).collect::<Vec<_>>();
         let targets: Vec<f32> = self.samples.iter().flat_map(filled).collect();
         let device = &Device::Cpu;
         Ok(HashMap::from([
@@ -100,17 +100,15 @@ impl Samples {
         }
         let path = folder.join(NUMBERS_FILE);
         std::fs::metadata(&path).map_err(|source| FolderError::file(&path, source))?;
-        let tensors =
-            candle_core::safetensors::load(&path, &Device::Cpu).map_err(|e| FolderError::format(&path, e))?;
+        let tensors = candle_core::safetensors::load(&path, &Device::Cpu).map_err(|e| FolderError::format(&path, e))?;
         let samples = samples_of(&tensors, &description.heads).map_err(|e| FolderError::format(&path, e))?;
         Ok(Samples { heads: description.heads, scenes: description.scenes, samples })
     }
 }
 
 fn samples_of(tensors: &HashMap<String, Tensor>, heads: &[HeadSpec]) -> candle_core::Result<Vec<Sample>> {
-    let tensor = |name: &str| {
-        tensors.get(name).ok_or_else(|| candle_core::Error::Msg(format!("there is no tensor `{name}`")))
-    };
+    let tensor =
+        |name: &str| tensors.get(name).ok_or_else(|| candle_core::Error::Msg(format!("there is no tensor `{name}`")));
     let triples = |name: &str| -> candle_core::Result<Vec<[f32; 3]>> {
         let rows = tensor(name)?.to_vec2::<f32>()?;
         let triple = |row: Vec<f32>| {

@@ -41,11 +41,7 @@ impl HeadSpec {
             YawSymmetry::Continuous => 0,
             YawSymmetry::Fold(fold) => fold,
         };
-        HeadSpec {
-            template: template.name.clone(),
-            parameters: fitted.map(|spec| spec.name.clone()).collect(),
-            fold,
-        }
+        HeadSpec { template: template.name.clone(), parameters: fitted.map(|spec| spec.name.clone()).collect(), fold }
     }
 }
 

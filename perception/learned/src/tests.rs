@@ -28,8 +28,10 @@ fn library() -> TemplateLibrary {
              intended_use = \"u\"\nnouns = [{{ noun = \"{name}\" }}]\n{parameters}[[solid]]\n{solid}\n[[symmetry]]\nfold = {fold}\n"
         )
     };
-    let brick = "shape = \"box\"\nsize = [\"length\", \"width\", \"height\"]\nposition = [\"0\", \"0\", \"height / 2\"]";
-    let tube = "shape = \"cylinder\"\nradius = \"radius\"\nheight = \"height\"\nposition = [\"0\", \"0\", \"height / 2\"]";
+    let brick =
+        "shape = \"box\"\nsize = [\"length\", \"width\", \"height\"]\nposition = [\"0\", \"0\", \"height / 2\"]";
+    let tube =
+        "shape = \"cylinder\"\nradius = \"radius\"\nheight = \"height\"\nposition = [\"0\", \"0\", \"height / 2\"]";
     let files = [
         ("brick.toml", template("brick", &["length", "width", "height"], brick, 2)),
         ("tube.toml", template("tube", &["radius", "height"], tube, 0)),
@@ -76,8 +78,7 @@ fn samples(count: usize) -> Samples {
 }
 
 fn estimator(net: Net, heads: Vec<HeadSpec>) -> Estimator {
-    let description =
-        Description { schema: SCHEMA.into(), shape: *net.shape(), origin: Origin::default(), heads };
+    let description = Description { schema: SCHEMA.into(), shape: *net.shape(), origin: Origin::default(), heads };
     Estimator::new(description, net)
 }
 
@@ -87,7 +88,8 @@ fn every_weight_gets_a_gradient() {
     for shape in [Shape::TINY, Shape { layers: 2, ..Shape::PAPER }] {
         let net = Net::drawn(shape, &samples.heads, 1).unwrap();
         let chosen: Vec<&Sample> = samples.samples.iter().collect();
-        let gradients = loss(&net, &chosen, &mut ChaCha8Rng::seed_from_u64(2)).unwrap().backward().unwrap();
+        let loss = loss(&net, &chosen, &mut ChaCha8Rng::seed_from_u64(2)).unwrap();
+        let gradients = loss.descended.backward().unwrap();
         let without: Vec<&str> = net
             .weights()
             .all()
@@ -124,11 +126,12 @@ fn sixteen_samples_are_learned_by_heart() {
     let plan = Plan { steps: 300, batch: 16, learning_rate: 2e-3, seed: 4 };
     let mut losses = Vec::new();
     train(&net, &samples, &plan, |progress| {
-        losses.push(progress.loss);
+        losses.push(progress.nats);
         ControlFlow::Continue(())
     })
     .unwrap();
     assert_eq!(losses.len(), plan.steps);
+    assert!(losses.last() < losses.first());
     let after = off(&net);
     assert!(before > 0.5 && after < 0.12, "the worst of all outputs was off by {before}, and is by {after}");
 }

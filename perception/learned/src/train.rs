@@ -6,7 +6,7 @@ use crate::{
     net::{Answer, Batch, Net},
     samples::{Sample, Samples},
 };
-use candle_core::{Device, Result, Tensor, backprop::GradStore};
+use candle_core::{DType, Device, Result, Tensor, backprop::GradStore};
 use candle_nn::optim::{AdamW, Optimizer, ParamsAdamW};
 use rand::{SeedableRng, seq::SliceRandom};
 use rand_chacha::ChaCha8Rng;
@@ -38,8 +38,8 @@ const LONGEST_GRADIENT: f64 = 1.0;
 pub struct Progress {
     /// Steps that were taken.
     pub step: usize,
-    /// The step's loss: what the estimate misses a sample by, nats an output.
-    pub loss: f64,
+    /// What the estimates missed the step's samples by, nats an output; see [`Loss::nats`].
+    pub nats: f64,
 }
 
 impl Plan {
@@ -105,16 +105,15 @@ pub fn train(
             };
             chosen.push(next);
         }
-        let loss = loss(net, &chosen, &mut rng)?;
-        let value = f64::from(loss.to_scalar::<f32>()?);
-        if !value.is_finite() {
+        let Loss { descended, nats } = loss(net, &chosen, &mut rng)?;
+        if !nats.is_finite() {
             candle_core::bail!("the loss of step {step} is no number: lower the learning rate");
         }
-        let mut gradients = loss.backward()?;
+        let mut gradients = descended.backward()?;
         shorten(net, &mut gradients)?;
         optimiser.set_learning_rate(plan.learning_rate_at(step));
         optimiser.step(&gradients)?;
-        if report(Progress { step: step + 1, loss: value }).is_break() {
+        if report(Progress { step: step + 1, nats }).is_break() {
             break;
         }
     }
@@ -141,11 +140,24 @@ fn shorten(net: &Net, gradients: &mut GradStore) -> Result<()> {
     Ok(())
 }
 
-/// What a network misses some samples by, nats an output. Clouds are cut anew each time.
+/// What a network misses some samples by.
+#[derive(Debug)]
+pub struct Loss {
+    /// What training descends: the negative logarithm of the estimated density, weighted by the deviation that is claimed
+    /// (Seitzer et al., "On the Pitfalls of Heteroscedastic Uncertainty Estimation", with their beta at 1/2). Without the
+    /// weight what is hard is not learned at all, because a large deviation excuses it. Its value says little: weights
+    /// shrink as estimates get better.
+    pub descended: Tensor,
+    /// The same without weights: an output's, on average, up to a constant. It falls by 1 where errors and claimed
+    /// deviations shrink e times.
+    pub nats: f64,
+}
+
+/// What a network misses some samples by. Clouds are cut anew each time.
 ///
 /// # Errors
 /// A sample has no points, or targets that do not fit its head.
-pub fn loss(net: &Net, samples: &[&Sample], rng: &mut ChaCha8Rng) -> Result<Tensor> {
+pub fn loss(net: &Net, samples: &[&Sample], rng: &mut ChaCha8Rng) -> Result<Loss> {
     let mut clouds = Vec::with_capacity(samples.len());
     for sample in samples {
         let Some(groups) = group(&sample.points, net.shape(), rng) else {
@@ -157,7 +169,8 @@ pub fn loss(net: &Net, samples: &[&Sample], rng: &mut ChaCha8Rng) -> Result<Tens
     let mut heads: Vec<usize> = samples.iter().map(|sample| sample.head).collect();
     heads.sort_unstable();
     heads.dedup();
-    let mut total = Tensor::zeros((), candle_core::DType::F32, &Device::Cpu)?;
+    let mut descended = Tensor::zeros((), DType::F32, &Device::Cpu)?;
+    let mut nats = 0.0;
     for head in heads {
         let own = || samples.iter().enumerate().filter(|(_, sample)| sample.head == head);
         let rows: Vec<u32> = own().map(|(row, _)| row as u32).collect();
@@ -166,17 +179,17 @@ pub fn loss(net: &Net, samples: &[&Sample], rng: &mut ChaCha8Rng) -> Result<Tens
         let targets = Tensor::from_vec(targets, (count, outputs), &Device::Cpu)?;
         let rows = Tensor::from_vec(rows, count, &Device::Cpu)?;
         let answer = net.answer(head, &features.index_select(&rows, 0)?)?;
-        total = (total + (missed(&answer, &targets)?.mean_all()? * count as f64)?)?;
+        let missed = missed(&answer, &targets)?;
+        let weighted = (&missed * answer.log_deviation.exp()?.detach())?;
+        let share = count as f64 / samples.len() as f64;
+        descended = (descended + (weighted.mean_all()? * share)?)?;
+        nats += share * f64::from(missed.mean_all()?.to_scalar::<f32>()?);
     }
-    total / samples.len() as f64
+    Ok(Loss { descended, nats })
 }
 
-/// The negative logarithm of a normal density, weighted by the deviation that is claimed (Seitzer et al., "On the
-/// Pitfalls of Heteroscedastic Uncertainty Estimation", with their beta at 1/2): without the weight what is hard is not
-/// learned at all, because a large deviation excuses it.
+/// The negative logarithm of the estimated normal density at the truth, of each output, up to a constant.
 fn missed(answer: &Answer, targets: &Tensor) -> Result<Tensor> {
-    let deviation = answer.log_deviation.exp()?;
-    let reduced = ((targets - &answer.mean)? / &deviation)?;
-    let missed = ((reduced.sqr()? * 0.5)? + &answer.log_deviation)?;
-    missed * deviation.detach()
+    let reduced = ((targets - &answer.mean)? / answer.log_deviation.exp()?)?;
+    (reduced.sqr()? * 0.5)? + &answer.log_deviation
 }

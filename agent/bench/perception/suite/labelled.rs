@@ -1,8 +1,6 @@
 //! Clouds of the suite's things with what is true of them: what estimators learn from and are compared on.
 
-use super::{
-    Plan, RowKind, Scene, Wanted, Workshop, draw, scene::TABLE_M, thing, view, view::Eye, view::View,
-};
+use super::{Plan, RowKind, Scene, Wanted, Workshop, draw, scene::TABLE_M, thing, view, view::Eye, view::View};
 use acm_concept::template::{SeenBy, Template, TemplateLibrary};
 use acm_perception::{
     GrounderConfig,

@@ -73,8 +73,8 @@ impl Eye {
         let labels: Vec<u16> = rendered.ids.iter().map(|id| id.saturating_sub(FIRST - 1) as u16).collect();
         if let Some(least_pixels) = least_pixels
             && !(whole(&labels, &rendered, scene.things.len(), least_pixels)
-            && touching(scene).all(|pair| edge_between(plan, &rendered, &camera.intrinsics, &labels, pair))
-            && self.seen(plan, scene, &camera, &labels)?)
+                && touching(scene).all(|pair| edge_between(plan, &rendered, &camera.intrinsics, &labels, pair))
+                && self.seen(plan, scene, &camera, &labels)?)
         {
             return Ok(None);
         }
