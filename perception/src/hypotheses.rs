@@ -13,7 +13,7 @@ use crate::{
 use acm_concept::{
     object::GroundedPart,
     pose::Pose,
-    template::{Rest, SeenBy, Template, TemplateLibrary},
+    template::{Rest, SeenBy, Template, TemplateLibrary, Unit},
 };
 use glam::{DQuat, DVec2, DVec3, Vec2Swizzles};
 use nalgebra::DMatrix;
@@ -73,6 +73,8 @@ const HOPELESS_COST: f64 = 25.0;
 /// dropped.
 const FORLORN_FACTOR: f64 = 4.0;
 const FORLORN_COST: f64 = 100.0;
+/// Shares of its range at which a hinge is tried.
+const OPENED: [f64; 2] = [0.25, 0.65];
 /// Starts that are fitted of each template.
 const STARTS: usize = 2;
 
@@ -168,12 +170,16 @@ impl<'a> Starts<'a> {
                 None => [rectangle.length, rectangle.width, height_m, radius],
                 Some(rest) => upright_measures(rest, along.extend(height_m)),
             };
-            let model = Model::new(template, template.initial_values(measures).ok()?, measured.base)?.lying(rest);
-            let at = if model.turns { rectangle.centre } else { centre };
+            let values = template.initial_values(measures).map_or(Vec::new(), |initial| opened(template, initial));
             // The measures are along the longer side, or across it.
             let quarter = if along.x < along.y { FRAC_PI_2 } else { 0.0 };
-            let start = model.start(at, rectangle.yaw + quarter);
-            Some((model, start))
+            let started = move |values: Vec<f64>| {
+                let model = Model::new(template, values, measured.base)?.lying(rest);
+                let at = if model.turns { rectangle.centre } else { centre };
+                let start = model.start(at, rectangle.yaw + quarter);
+                Some((model, start))
+            };
+            values.into_iter().filter_map(started).collect::<Vec<_>>()
         };
         // In another rest either side of the rectangle may be the part's own height.
         let ways = |rectangle| {
@@ -181,12 +187,12 @@ impl<'a> Starts<'a> {
             let across = rest.map(|_| (rectangle, sides(rectangle).yx()));
             std::iter::once((rectangle, sides(rectangle))).chain(across)
         };
-        let mut starts: Vec<_> = rectangles.iter().flat_map(ways).filter_map(start_at).collect();
+        let mut starts: Vec<_> = rectangles.iter().flat_map(ways).flat_map(start_at).collect();
         // A thing whose two ends differ may lie either way round.
         if starts.first().is_some_and(|(model, _)| model.has_two_ends()) {
             let turned = |r: &Rectangle| Rectangle { yaw: r.yaw + std::f64::consts::PI, ..*r };
             let turned: Vec<Rectangle> = rectangles.iter().map(turned).collect();
-            starts.extend(turned.iter().flat_map(ways).filter_map(start_at));
+            starts.extend(turned.iter().flat_map(ways).flat_map(start_at));
         }
         // What is round starts alike in every rectangle.
         starts.dedup_by(|a, b| a.1 == b.1);
@@ -206,6 +212,19 @@ impl<'a> Starts<'a> {
         });
         near.min_by(|a, b| a.cost.total_cmp(&b.cost))
     }
+}
+
+/// The first guess, and for each angle of the template two more, with the hinge little and far open: no measure of a
+/// segment tells how far.
+fn opened(template: &Template, initial: Vec<f64>) -> Vec<Vec<f64>> {
+    let angles = template.parameters.iter().enumerate().filter(|(_, spec)| spec.unit == Unit::Rad && !spec.fixed);
+    let at = |share: f64| angles.clone().map(move |(index, spec)| (index, spec.min + share * (spec.max - spec.min)));
+    let moved = |(index, value): (usize, f64)| {
+        let mut values = initial.clone();
+        values[index] = value;
+        values
+    };
+    OPENED.into_iter().flat_map(at).map(moved).chain(std::iter::once(initial.clone())).collect()
 }
 
 /// The measures of a segment as they would be if the part were stood upright, from its extents along the axes of its
@@ -306,6 +325,8 @@ fn score(context: Context, model: &Model, minimum: &Minimum, evidence: &Evidence
 
 /// A residual up to this many standard deviations counts as explained.
 const EXPLAINED: f64 = 3.0;
+/// So is an outline point up to this many pixels, however sharp the edge.
+const EXPLAINED_PX: f64 = 4.5;
 
 impl Hypothesis<'_> {
     /// Share of the evidence that the fit explains: of the surface points, and of the outline points that are the
@@ -316,13 +337,13 @@ impl Hypothesis<'_> {
         let (points, outline) = residuals.split_at(evidence.points.len().min(residuals.len()));
         let share = |good: usize, all: usize| if all == 0 { 1.0 } else { good as f64 / all as f64 };
         let fits = |r: &&f64| r.abs() < EXPLAINED;
-        let own: Vec<f64> = outline
+        let own: Vec<bool> = outline
             .iter()
             .zip(&evidence.outline)
             .filter(|(_, p)| p.kind == OutlineKind::Own)
-            .map(|(r, _)| *r)
+            .map(|(r, p)| r.abs() < EXPLAINED.max(EXPLAINED_PX / p.sigma_px))
             .collect();
-        (share(points.iter().filter(fits).count(), points.len()), share(own.iter().filter(fits).count(), own.len()))
+        (share(points.iter().filter(fits).count(), points.len()), share(own.iter().filter(|fits| **fits).count(), own.len()))
     }
 }
 

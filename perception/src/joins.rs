@@ -15,12 +15,14 @@ use std::collections::BTreeSet;
 /// Most joins in one frame.
 const MAX_JOINS: usize = 24;
 /// Colours of the parts of one thing that are joined by their shape differ by less, in the units of a tint.
-const SAME_TINT: f32 = 12.0;
+const SAME_TINT: f32 = 20.0;
 /// Parts of one thing that do not touch in the image are nearer to each other than this.
 const NEAR_M: f64 = 0.02;
 /// Share of a fringe's outline along which the thing cuts it off, and of its pixels that are two from its border.
 const FRINGE_CUT: f64 = 0.3;
 const FRINGE_THICK: f64 = 0.1;
+/// Evidence (negative log likelihood) that it takes to believe that two things lie like the parts of one.
+const COINCIDENCE: f64 = 15.0;
 /// Tops of pieces of one thing are level within this.
 const LEVEL_M: f64 = 0.016;
 
@@ -230,7 +232,9 @@ fn is_one_with(scene: &Scene, segments: &Segments, context: Context, a: &Piece, 
     }
     let joint = union(scene, segments, a, b, false);
     let Some(comparison) = compare(context, &joint, a, b) else { return false };
-    comparison.together < comparison.apart
+    // Two things seldom lie as the parts of one do.
+    let coincidence = if comparison.solids > 1 { COINCIDENCE } else { 0.0 };
+    comparison.together < comparison.apart + coincidence
         && comparison.on_surface > 0.93
         && comparison.on_outline > 0.85
         && (touching || comparison.solids > 1)
