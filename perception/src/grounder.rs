@@ -8,7 +8,7 @@ use crate::{
     config::GrounderConfig,
     expected::{self, Remembered},
     fit::{Base, Evidence},
-    hypotheses::{self, Context, Measured},
+    hypotheses::{self, Context, Hypothesis, Measured},
     joins, own, patches,
     scan::Scan,
     scene::Scene,
@@ -144,14 +144,18 @@ impl Grounder {
         pieces.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         for (lowest_m, pixels, evidence) in pieces {
             let plan: Vec<DVec2> = evidence.points.iter().map(|p| p.position.truncate()).collect();
-            let base = bodies.base_under(&plan, lowest_m, &evidence);
-            let bottom = match base {
-                Base::At(height) | Base::Free(height) => height,
-            };
-            let height_m = evidence.top_m() - bottom;
-            let measured = Measured { plan, height_m, base, seen_by: SeenBy::Depth };
             let context = context(remembered.at(&pixels, SeenBy::Depth));
-            let ranked = hypotheses::rank(context, &measured, &evidence);
+            let rank = |base: Base| {
+                let (Base::At(bottom) | Base::Free(bottom)) = base;
+                let height_m = evidence.top_m() - bottom;
+                let measured = Measured { plan: plan.clone(), height_m, base, seen_by: SeenBy::Depth };
+                hypotheses::rank(context, &measured, &evidence)
+            };
+            // What seems to hang in the air may hide what it stands on.
+            let ranked = match bodies.base_under(&plan, lowest_m, &evidence) {
+                free @ Base::Free(_) => better(rank(free), rank(Base::At(0.0))),
+                base => rank(base),
+            };
             if let Some(object) = assemble::object(scene, context, &ranked, &evidence, &pixels, 1.0) {
                 bodies.add(&ranked);
                 objects.push(object);
@@ -159,6 +163,12 @@ impl Grounder {
         }
         objects
     }
+}
+
+/// The ranking whose best hypothesis is the more probable.
+fn better<'a>(a: Vec<Hypothesis<'a>>, b: Vec<Hypothesis<'a>>) -> Vec<Hypothesis<'a>> {
+    let best = |ranked: &[Hypothesis]| ranked.first().map_or(f64::NEG_INFINITY, |first| first.score);
+    if best(&b) > best(&a) { b } else { a }
 }
 
 fn support_plane(scene: &Scene, plane: &Plane) -> SupportPlane {

@@ -50,6 +50,8 @@ pub(crate) struct Context<'a> {
 pub(crate) struct Hypothesis<'a> {
     pub model: Model<'a>,
     pub minimum: Minimum,
+    /// Penalised log likelihood with the template's odds.
+    pub score: f64,
     /// Posterior probability among the hypotheses that were tried.
     pub probability: f64,
     /// The remembered part whose parameters were taken over, so that only the place was fitted.
@@ -104,25 +106,25 @@ pub(crate) fn rank<'a>(context: Context<'a>, measured: &Measured, evidence: &Evi
     let best = near.iter().map(|a| a.cost).fold(f64::INFINITY, f64::min);
     // What is far behind after the rough fit is not worth a fine one.
     let promising = near.into_iter().filter(|a| a.cost < HOPELESS_FACTOR * best + HOPELESS_COST);
-    let mut scored: Vec<(f64, Hypothesis<'a>)> = promising
+    let mut scored: Vec<Hypothesis<'a>> = promising
         .filter_map(|Approach { model, state, .. }| {
             let minimum = canonical(&model, minimise(&model, evidence, &state), evidence)?;
             let score = score(context, &model, &minimum, evidence);
-            Some((score, Hypothesis { model, minimum, probability: 0.0, tracked: None }))
+            Some(Hypothesis { model, minimum, score, probability: 0.0, tracked: None })
         })
         .collect();
     scored.extend(track(context, measured, &rectangles, evidence));
-    scored.sort_by(|a, b| b.0.total_cmp(&a.0));
-    if let Some(other) = scored.first().and_then(|(_, best)| tipped::read_anew(context, best, evidence)) {
+    scored.sort_by(|a, b| b.score.total_cmp(&a.score));
+    if let Some(other) = scored.first().and_then(|best| tipped::read_anew(context, best, evidence)) {
         scored.insert(0, other);
     }
-    let Some(best) = scored.first().map(|(score, _)| *score) else { return Vec::new() };
+    let Some(best) = scored.first().map(|best| best.score) else { return Vec::new() };
     // Where even the best fits badly the likelihoods of all are less sure than they look.
-    let misfit = scored.first().map_or(1.0, |(_, h)| h.minimum.cost / (0.5 * evidence.independent()).max(1.0));
+    let misfit = scored.first().map_or(1.0, |h| h.minimum.cost / (0.5 * evidence.independent()).max(1.0));
     let temperature = misfit.max(1.0);
-    let odds: Vec<f64> = scored.iter().map(|(score, _)| ((score - best) / temperature).exp()).collect();
+    let odds: Vec<f64> = scored.iter().map(|h| ((h.score - best) / temperature).exp()).collect();
     let total: f64 = odds.iter().sum();
-    scored.into_iter().zip(odds).map(|((_, h), odd)| Hypothesis { probability: odd / total, ..h }).collect()
+    scored.into_iter().zip(odds).map(|(h, odd)| Hypothesis { probability: odd / total, ..h }).collect()
 }
 
 /// What is settled in memory and explains the evidence as well as noise lets anything do: only its place is fitted,
@@ -132,7 +134,8 @@ fn recognise<'a>(context: Context<'a>, measured: &Measured, evidence: &Evidence)
     let (model, (at, yaw)) = as_remembered(context, part, measured)?;
     let start = model.start(at, yaw);
     let minimum = minimise(&model, evidence, &approach(&model, evidence, &start));
-    let found = Hypothesis { model, minimum, probability: 1.0, tracked: Some(part) };
+    let score = score(context, &model, &minimum, evidence);
+    let found = Hypothesis { model, minimum, score, probability: 1.0, tracked: Some(part) };
     let (on_surface, on_outline) = found.explained(evidence);
     let misfit = found.minimum.cost / (0.5 * evidence.independent()).max(1.0);
     (misfit < RECOGNISED_MISFIT && on_surface > RECOGNISED && on_outline > RECOGNISED_OUTLINE).then_some(found)
@@ -263,7 +266,7 @@ fn track<'a>(
     measured: &Measured,
     rectangles: &[Rectangle],
     evidence: &Evidence,
-) -> Option<(f64, Hypothesis<'a>)> {
+) -> Option<Hypothesis<'a>> {
     let Known { part, .. } = context.remembered.filter(|_| evidence.cut_share() > TRACKED_CUT)?;
     let (model, own) = as_remembered(context, part, measured)?;
     let starts = std::iter::once(own).chain(rectangles.iter().map(|r| (r.centre, r.yaw)));
@@ -274,7 +277,7 @@ fn track<'a>(
     let (_, start) = starts.map(rough).min_by(|a, b| a.0.total_cmp(&b.0))?;
     let minimum = minimise(&model, evidence, &approach(&model, evidence, &start));
     let score = score(context, &model, &minimum, evidence);
-    Some((score, Hypothesis { model, minimum, probability: 0.0, tracked: Some(part) }))
+    Some(Hypothesis { model, minimum, score, probability: 0.0, tracked: Some(part) })
 }
 
 /// The same solids under parameter values that the template admits: as they are, or with two parameters exchanged

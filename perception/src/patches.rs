@@ -304,6 +304,7 @@ fn outline(scene: &Scene, ground: &[Ground], pixels: &[usize]) -> Vec<OutlinePoi
                 pixel: at + DVec2::new(dx as f64, dy as f64) * 0.5,
                 sigma_px: 1.0,
                 kind,
+                falls_off: false,
                 beyond: NONE,
             });
         }

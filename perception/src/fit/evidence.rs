@@ -33,6 +33,8 @@ pub(crate) struct OutlinePoint {
     pub pixel: DVec2,
     pub sigma_px: f64,
     pub kind: OutlineKind,
+    /// Whether depth shows something farther on the other side.
+    pub falls_off: bool,
     /// Segment on the other side, [`NONE`] for the surface and everything else.
     pub beyond: u32,
 }
@@ -134,17 +136,19 @@ fn outline(scene: &Scene, segments: &Segments, pixels: &[usize]) -> Vec<OutlineP
             let outwards = DVec2::new(dx as f64, dy as f64);
             // Where a nearer thing begins is no edge of this one.
             let edge = if kind == OutlineKind::Cut { None } else { color_edge(scene, pixel, dx, dy) };
+            let falls_off = kind == OutlineKind::Own;
             let point = match edge {
                 // The colour shows where it ends, also where it meets the surface.
                 Some(px) => OutlinePoint {
                     pixel: at + outwards * px,
                     sigma_px: scene.config.color_edge_sigma_px,
                     kind: if beyond == NONE { OutlineKind::Own } else { kind },
+                    falls_off,
                     beyond,
                 },
                 None => {
                     let sigma_px = scene.config.outline_sigma_px * if over_hole { 1.7 } else { 1.0 };
-                    OutlinePoint { pixel: at + outwards * 0.5, sigma_px, kind, beyond }
+                    OutlinePoint { pixel: at + outwards * 0.5, sigma_px, kind, falls_off, beyond }
                 }
             };
             points.push(point);

@@ -43,7 +43,7 @@ fn evidence(solid: &PlacedSolid, camera: Pose, sigma_m: f64) -> Evidence {
             if depth(column + dx, row + dy).is_none() {
                 let kind = if at.z < 0.012 { OutlineKind::Contact } else { OutlineKind::Own };
                 let pixel = DVec2::new(column as f64 + 0.5 * dx as f64, row as f64 + 0.5 * dy as f64);
-                outline.push(OutlinePoint { pixel, sigma_px: 1.5, kind, beyond: u32::MAX });
+                outline.push(OutlinePoint { pixel, sigma_px: 1.5, kind, falls_off: kind == OutlineKind::Own, beyond: u32::MAX });
             }
         }
     }

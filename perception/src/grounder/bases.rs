@@ -1,7 +1,7 @@
 //! What each segment stands on: the plane, a patch or a thing below it, or nothing that is seen.
 
 use crate::{
-    fit::{Base, Evidence, OutlineKind},
+    fit::{Base, Evidence},
     hypotheses::Hypothesis,
 };
 use acm_concept::solid::PlacedSolid;
@@ -61,7 +61,7 @@ fn bottom_is_own(evidence: &Evidence) -> bool {
     let (mut own, mut all) = (0usize, 0usize);
     for point in evidence.outline.iter().filter(|p| is_lower(p.pixel)) {
         all += 1;
-        own += usize::from(point.kind == OutlineKind::Own);
+        own += usize::from(point.falls_off);
     }
     all > 4 && own * 2 > all
 }

@@ -17,13 +17,13 @@ const AGREES_SHARE: f64 = 0.1;
 /// The other reading may explain the evidence worse by this much (negative log likelihood).
 const AS_GOOD: f64 = 3.0;
 
-/// The best hypothesis, read as a part of memory's that is not in its place and now lies on another side; with its score.
+/// The best hypothesis, read as a part of memory's that is not in its place and now lies on another side.
 /// `None` where no such part has the sizes, or one that has them stands upright as it was.
 pub(super) fn read_anew<'a>(
     context: Context<'a>,
     best: &Hypothesis<'a>,
     evidence: &Evidence,
-) -> Option<(f64, Hypothesis<'a>)> {
+) -> Option<Hypothesis<'a>> {
     let (template, base) = (best.model.template, best.model.base);
     let seen = outer(template, &best.model.placement(&best.minimum.state).values, DQuat::IDENTITY)?;
     let mut nearest: Option<(f64, &Rest, Vec<f64>)> = None;
@@ -53,7 +53,7 @@ pub(super) fn read_anew<'a>(
     }
     // As good a reading as the upright one; memory decides between them.
     let score = score(context, &best.model, &best.minimum, evidence) + context.config.memory_boost.ln();
-    Some((score, Hypothesis { model, minimum, probability: 0.0, tracked: None }))
+    Some(Hypothesis { model, minimum, score, probability: 0.0, tracked: None })
 }
 
 /// Longer side, shorter side and height of what a part covers when it is turned by `turn`, metres.
