@@ -36,7 +36,7 @@ impl Weights {
 /// Where the weights of a network come from while it is put together.
 pub enum Source {
     /// Drawn anew.
-    Drawn(ChaCha8Rng),
+    Drawn(Box<ChaCha8Rng>),
     /// Taken from a file's.
     Read(HashMap<String, Tensor>),
 }
@@ -44,7 +44,7 @@ pub enum Source {
 impl Source {
     /// Weights drawn from a seed: equal seeds give equal ones.
     pub fn drawn(seed: u64) -> Source {
-        Source::Drawn(ChaCha8Rng::seed_from_u64(seed))
+        Source::Drawn(Box::new(ChaCha8Rng::seed_from_u64(seed)))
     }
     /// The weights of a file.
     pub fn read(path: &Path) -> std::result::Result<Source, FolderError> {
