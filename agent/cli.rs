@@ -9,6 +9,7 @@ use crate::{
     bench::{perception::PerceptionPart, world::WorldPart},
     demo, doctor,
     inject::Injection,
+    library,
     llm::LlmId,
     perceive, run, scenario, serve,
 };
@@ -77,6 +78,8 @@ pub enum Command {
     /// List, check, describe or draw scenarios.
     #[command(subcommand)]
     Scenario(ScenarioCommand),
+    /// List the templates in this program, or draw them.
+    Library(LibraryArgs),
     /// Run the simulator in a process of its own.
     #[command(subcommand)]
     Sim(SimCommand),
@@ -283,6 +286,10 @@ pub struct PerceiveArgs {
     /// A text file with a line `STEM x y z qx qy qz qw` for every frame; `#` begins a comment.
     #[arg(long, value_name = "FILE", conflicts_with = "camera_pose")]
     pub camera_poses: Option<PathBuf>,
+    /// What perception goes by: a TOML file with `[perception]` and `[tools]`, such as `[tools]` with
+    /// `segmenter = "http://127.0.0.1:8765"` (docs/perception-tools.md).
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
     /// Keep what is seen in this memory folder, and go on with what it holds.
     #[arg(long, value_name = "DIR")]
     pub memory: Option<PathBuf>,
@@ -297,6 +304,16 @@ pub struct PerceiveArgs {
     /// Print JSON (docs/perceive.md) instead of text.
     #[arg(long)]
     pub json: bool,
+}
+
+/// Arguments of `acm library`.
+#[derive(Debug, Args)]
+pub struct LibraryArgs {
+    /// Groups to list, such as core or kitchen; all if none is named.
+    pub groups: Vec<String>,
+    /// Write library.md and a picture of each template below this folder instead.
+    #[arg(long, value_name = "DIR", conflicts_with = "groups")]
+    pub gallery: Option<PathBuf>,
 }
 
 /// The verbs of `acm scenario`.
@@ -445,6 +462,7 @@ pub fn run(cli: Cli) -> anyhow::Result<Exit> {
         Command::Demo(args) => demo::run(&args),
         Command::Perceive(args) => perceive::run(&args),
         Command::Scenario(command) => scenario::run(&command),
+        Command::Library(args) => library::run(&args),
         Command::Sim(SimCommand::Serve(args)) => serve::run(&args),
         Command::Trace(command) => crate::trace::run(&command),
         Command::Bench(command) => bench::run(&command),

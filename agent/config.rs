@@ -24,6 +24,7 @@ pub fn read(path: &Path) -> anyhow::Result<Settings> {
         anyhow::anyhow!("{name}, line {line}: {}", error.message().replace('\n', " "))
     })?;
     settings.perception.check().map_err(|reason| anyhow::anyhow!("{name}: perception.{reason}"))?;
+    settings.tools.check().map_err(|reason| anyhow::anyhow!("{name}: tools.{reason}"))?;
     Ok(settings)
 }
 
@@ -54,6 +55,9 @@ mod tests {
             ("[perception]\nmin_confidence = 1.5\n", &["perception.min_confidence", "1.5"]),
             ("[perception]\ndepth_min_m = nan\n", &["perception.depth_min_m"]),
             ("[perception\n", &["line 1"]),
+            ("[tools]\nsegmentor = 'http://a.b'\n", &["line 2", "segmentor", "segmenter"]),
+            ("[tools]\ndeadline_ms = 0\n", &["tools.deadline_ms", "0"]),
+            ("[tools]\ndetector = 'http://a.b'\n", &["tools.detector", "segmenter"]),
         ] {
             let error = format!("{:#}", read_text(text).unwrap_err());
             assert!(parts.iter().all(|part| error.contains(part)), "{error}");

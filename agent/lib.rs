@@ -16,7 +16,8 @@
 //! | [`perceive`] | `acm perceive`: real frames, no simulator |
 //! | [`mod@bench`] | `acm bench`: figures beside what they are to reach |
 //! | `learn` | `acm learn`: the learned estimator (feature `learned`) |
-//! | [`scenario`], [`doctor`] | `acm scenario`, `acm doctor` |
+//! | [`tools`] | the tools of perception that a user names, opened |
+//! | [`scenario`], [`library`], [`doctor`] | `acm scenario`, `acm library`, `acm doctor` |
 //! | [`trace`] | `acm trace`: a run written down, and looked into |
 //! | [`video`] | `acm run --video`: an episode as moving pictures |
 //! | [`embed`] | what the pages of `acm demo` and `acm trace` have in common |
@@ -33,6 +34,7 @@ pub mod episode;
 pub mod inject;
 #[cfg(feature = "learned")]
 pub mod learn;
+pub mod library;
 pub mod live;
 pub mod llm;
 pub mod narrate;
@@ -42,6 +44,7 @@ pub mod run;
 pub mod scenario;
 pub mod serve;
 pub mod statistics;
+pub mod tools;
 pub mod trace;
 pub mod video;
 pub mod words;

@@ -4,7 +4,11 @@ pub mod input;
 pub mod report;
 pub mod sample;
 
-use crate::cli::{Exit, PerceiveArgs};
+use crate::{
+    cli::{Exit, PerceiveArgs},
+    config, tools,
+};
+use acm_actors::settings::Settings;
 use acm_concept::{
     camera::{FrameHeader, RgbdFrame},
     embodiment::Feedback,
@@ -18,7 +22,7 @@ use acm_memory::{
     Memory,
     observation::{Note, Observation},
 };
-use acm_perception::{Grounder, GrounderConfig, frames, labels, overlay};
+use acm_perception::{Assisted, AssistedGrounder, Grounder, GrounderConfig, frames, labels, overlay};
 use anyhow::Context;
 use glam::DVec3;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -43,7 +47,11 @@ pub fn run(args: &PerceiveArgs) -> anyhow::Result<Exit> {
         Some(dir) => Box::new(acm_memory::AcmMemory::open(dir, Arc::clone(&library))?),
         None => Box::new(acm_memory::AcmMemory::in_memory(Arc::clone(&library))),
     };
-    let grounder = Grounder::new(Arc::clone(&library), GrounderConfig::default());
+    let unknown = || Settings { perception: GrounderConfig::of_unknown_camera(), ..Settings::default() };
+    let settings = args.config.as_deref().map(config::read).transpose()?.unwrap_or_else(unknown);
+    let file = args.config.as_deref().map_or_else(String::new, |path| path.display().to_string());
+    let tools = tools::open(&file, &settings.tools)?;
+    let grounder = Grounder::new(Arc::clone(&library), settings.perception).with_tools(tools);
     let mut session = Session { input: &input, pictures, library, memory, grounder };
     session.memory.note(&Note::EpisodeBegan)?;
     let progress = Progress::new(input.frames.len());
@@ -73,7 +81,7 @@ struct Session<'a> {
     pictures: Pictures,
     library: Arc<TemplateLibrary>,
     memory: Box<dyn Memory>,
-    grounder: Grounder,
+    grounder: AssistedGrounder,
 }
 
 impl Session<'_> {
@@ -83,10 +91,10 @@ impl Session<'_> {
         let id = FrameId(index as u64);
         let time = Time::from_seconds(FRAME_INTERVAL_S * index as f64);
         let frame = frames::read_pair(&files.color, &files.depth, intrinsics, scale, files.camera_pose, id, time)?;
-        let percepts = self.grounder.ground(&frame, &self.memory.expect(time));
+        let Assisted { percepts, calls } = self.grounder.ground(&frame, &self.memory.expect(time));
         let observation = Observation { percepts: &percepts, frame: &frame, feedback: &no_robot(&frame.header) };
         let grounding = self.memory.observe(&observation)?;
-        let report = FrameReport::new(files, &percepts, &grounding, self.memory.view().as_ref());
+        let report = FrameReport::new(files, &percepts, calls, &grounding, self.memory.view().as_ref());
         self.draw(&files.stem, &frame, &percepts, &report)?;
         Ok(report)
     }

@@ -17,11 +17,13 @@ use acm_actors::{message::Message, report::Ending};
 use acm_concept::{task::OnUnknown, template::TemplateLibrary};
 use acm_runtime::journal::{Both, Journal, NoJournal};
 use acm_sim::Scenario;
+use anyhow::bail;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use std::{
     collections::{BTreeMap, BTreeSet},
     io::Write,
+    path::Path,
     sync::Arc,
 };
 
@@ -42,6 +44,10 @@ pub fn run(args: &RunArgs) -> anyhow::Result<Exit> {
 /// Reads what a run needs beside its world.
 pub(crate) fn prepare(args: &RunArgs) -> anyhow::Result<(EpisodeConfig, TemplateLibrary)> {
     let mut settings = args.config.as_deref().map(config::read).transpose()?.unwrap_or_default();
+    if let Some((field, _)) = settings.tools.named().next() {
+        let file = args.config.as_deref().unwrap_or(Path::new("--config")).display();
+        bail!("{file}: tools.{field}: a run asks no tools, as it could not be replayed; they help `acm perceive`");
+    }
     settings.on_unknown = args.on_unknown.map_or(settings.on_unknown, Into::into);
     let config = EpisodeConfig {
         method: args.method.clone(),

@@ -96,6 +96,14 @@ fn missing_and_damaged_frames_are_named() {
 }
 
 #[test]
+fn templates_are_listed_by_group() {
+    let out = acm().args(["library", "core", "blocks"]).output().unwrap();
+    let text = String::from_utf8(out.stdout).unwrap();
+    assert!(out.status.success() && text.contains("core       box") && text.contains("blocks     l-block"), "{text}");
+    refuses(&["library", "blcks"], &["`blcks`", "blocks"]);
+}
+
+#[test]
 fn a_method_that_does_not_exist_is_named() {
     refuses(&["run", "put-back-block", "--method", "reactve"], &["reactve", "reactive"]);
 }
@@ -119,6 +127,9 @@ fn a_library_file_with_a_parameter_out_of_range_is_refused() {
     let library = Path::new(env!("CARGO_MANIFEST_DIR")).join("memory/library");
     for entry in fs::read_dir(library).unwrap() {
         let path = entry.unwrap().path();
+        if path.is_dir() {
+            continue;
+        }
         let text = fs::read_to_string(&path).unwrap();
         fs::write(dir.path().join(path.file_name().unwrap()), text.replacen("max = 0.6", "max = 60.0", 1)).unwrap();
     }

@@ -49,6 +49,12 @@ pub enum AgentError {
     /// The task names no camera.
     #[error("the task has no camera: the agent needs at least one")]
     NoCamera,
+    /// The settings name tools of perception. What a tool answers is an effect that the trace does not hold yet, and a run
+    /// that asked one could not be replayed.
+    #[error(
+        "the settings name `tools.{0}`: a run asks no tools, as it could not be replayed; they help `acm perceive`"
+    )]
+    Tools(&'static str),
     /// The planner's lexicon is broken.
     #[error(transparent)]
     Lexicon(#[from] acm_planner::LexiconError),
@@ -135,6 +141,11 @@ impl AgentBuilder {
     }
     /// The agent.
     pub fn build(mut self) -> Result<Agent, AgentError> {
+        let later = self.then.iter().map(|(_, settings)| settings);
+        if let Some((field, _)) = std::iter::once(&self.settings).chain(later).find_map(|all| all.tools.named().next())
+        {
+            return Err(AgentError::Tools(field));
+        }
         let planner = self.lexicon.take().map_or_else(Planner::new, |lexicon| Ok(Planner::with_lexicon(lexicon)))?;
         Ok(Agent { parts: self, planner: Arc::new(planner) })
     }

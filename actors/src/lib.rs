@@ -26,6 +26,7 @@
 //! | [`perception`], [`memory`], [`planner`], [`executor`], [`verifier`] | the five actors |
 //! | [`host`] | the port to the outside world |
 //! | [`llm`] | the port to a language model, where one is used |
+//! | [`tools`] | perception's tools in other processes |
 //! | [`remote`] | an outside world in another process |
 
 pub mod agent;
@@ -41,6 +42,7 @@ pub mod remote;
 pub mod replay;
 pub mod report;
 pub mod settings;
+pub mod tools;
 pub mod trace;
 pub mod verifier;
 

@@ -1,5 +1,6 @@
 //! What an agent goes by, and how that may change once while it runs.
 
+use crate::tools::ToolSettings;
 use acm_concept::task::OnUnknown;
 use acm_perception::GrounderConfig;
 use serde::{Deserialize, Serialize};
@@ -16,6 +17,11 @@ pub struct Settings {
     pub on_unknown: OnUnknown,
     /// Thresholds of perception.
     pub perception: GrounderConfig,
+    /// Tools that help perception on single frames. An agent that is to run refuses them: see [`AgentError::Tools`].
+    ///
+    /// [`AgentError::Tools`]: crate::AgentError::Tools
+    #[serde(skip_serializing_if = "ToolSettings::is_default")]
+    pub tools: ToolSettings,
 }
 
 /// Something that is to happen once another thing has happened.

@@ -15,6 +15,7 @@ use acm_memory::{
     entry::{ObjectEntry, Presence},
     observation::{Grounding, Resolved},
 };
+use acm_perception::tools::ToolCall;
 use glam::DVec3;
 use serde::Serialize;
 use std::{
@@ -132,6 +133,9 @@ pub struct FrameReport {
     pub objects: Vec<SeenObject>,
     /// What memory knows and the frame does not show.
     pub absent: Vec<AbsentObject>,
+    /// What tools were asked, what came of it, and what was made of their answers.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub tools: Vec<ToolCall>,
 }
 
 /// The JSON document of `acm perceive --json`.
@@ -150,7 +154,13 @@ impl<'a> Report<'a> {
 
 impl FrameReport {
     /// Joins what perception saw with what memory made of it.
-    pub fn new(files: &FramePair, percepts: &Percepts, grounding: &Grounding, memory: &dyn MemoryView) -> FrameReport {
+    pub fn new(
+        files: &FramePair,
+        percepts: &Percepts,
+        calls: Vec<ToolCall>,
+        grounding: &Grounding,
+        memory: &dyn MemoryView,
+    ) -> FrameReport {
         let resolved = |index| grounding.resolved.iter().find(|resolved| resolved.percept == index);
         let objects = percepts.objects.iter().enumerate();
         FrameReport {
@@ -163,6 +173,7 @@ impl FrameReport {
             support: percepts.support,
             objects: objects.map(|(i, object)| seen(i, object, resolved(i), memory)).collect(),
             absent: memory.objects().iter().filter_map(|entry| absent(entry, percepts, grounding)).collect(),
+            tools: calls,
         }
     }
 
@@ -187,6 +198,22 @@ impl FrameReport {
         [of(Status::Missing), of(Status::Unseen)].into_iter().flatten().collect()
     }
 
+    /// What the tools had to do with it: a line for each question and each outcome of it.
+    fn tool_lines(&self) -> Vec<String> {
+        let mut lines: Vec<(String, usize)> = Vec::new();
+        for call in &self.tools {
+            let remark = call.remark.as_ref().map_or_else(String::new, |remark| format!(", {remark}"));
+            let line =
+                format!("{} asked to {}: {}{remark}; {}", call.meta.identity.tool, call.asked, call.outcome, call.made);
+            match lines.iter_mut().find(|(known, _)| *known == line) {
+                Some((_, count)) => *count += 1,
+                None => lines.push((line, 1)),
+            }
+        }
+        let times = |(line, count)| if count > 1 { format!("{line} ({count} times)") } else { line };
+        lines.into_iter().map(times).collect()
+    }
+
     /// Writes a heading, a line for every object that is seen, and one for every object that is not. The library knows
     /// the units of the parameters.
     pub fn print(&self, library: &TemplateLibrary, out: &mut dyn Write) -> io::Result<()> {
@@ -208,6 +235,9 @@ impl FrameReport {
         for object in &self.absent {
             let last = object.last_pose.map_or_else(String::new, |pose| format!(" last at {}", place(&pose)));
             writeln!(out, "  {:<4} {:<9} {:<9}{last}", object.id.to_string(), object.status.word(), object.category)?;
+        }
+        for line in self.tool_lines() {
+            writeln!(out, "  {line}")?;
         }
         Ok(())
     }

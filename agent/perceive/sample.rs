@@ -26,8 +26,8 @@ pub fn photograph(picture: &Path) -> anyhow::Result<Option<String>> {
     let Some(pair) = input::pairs_in(&folder)?.into_iter().find(|pair| pair.stem == STEM) else { return Ok(None) };
     let library = Arc::new(acm_memory::default_library()?);
     let frame = frames::read_pair(&pair.color, &pair.depth, INTRINSICS, 0.001, None, FrameId(0), Time::ZERO)?;
-    let percepts =
-        Grounder::new(Arc::clone(&library), GrounderConfig::default()).ground(&frame, &Expectation::default());
+    let percepts = Grounder::new(Arc::clone(&library), GrounderConfig::of_unknown_camera())
+        .ground(&frame, &Expectation::default());
     let drawn = overlay::draw(&frame, &percepts, &[], &library);
     drawn.save(picture).with_context(|| format!("the picture {} cannot be written", picture.display()))?;
     let things: Vec<String> = percepts.objects.iter().map(|object| thing(object, &library)).collect();

@@ -35,10 +35,15 @@ pub fn draw(image: &mut RgbImage, header: &FrameHeader, object: &ObjectEntry, li
     }
 }
 
-/// The edges of a solid in its own frame.
+/// The edges of a solid, or of the box round an ellipsoid, in its own frame.
 fn edges(solid: &Solid) -> Vec<[DVec3; 2]> {
+    let point = |index: usize, radius: f64, z: f64| {
+        let (sin, cos) = (TAU * index as f64 / RIM as f64).sin_cos();
+        DVec3::new(radius * cos, radius * sin, z)
+    };
+    let rim = |radius: f64, z: f64| (0..RIM).map(move |i| [point(i, radius, z), point(i + 1, radius, z)]);
     match *solid {
-        Solid::Box { size } => {
+        Solid::Box { size } | Solid::Ellipsoid { size } => {
             let corner = |bits: usize| {
                 let side = |bit: usize, length: f64| if bits & bit == 0 { -0.5 * length } else { 0.5 * length };
                 DVec3::new(side(1, size.x), side(2, size.y), side(4, size.z))
@@ -49,12 +54,17 @@ fn edges(solid: &Solid) -> Vec<[DVec3; 2]> {
             (0..8).flat_map(of).map(|(a, b)| [corner(a), corner(b)]).collect()
         }
         Solid::Cylinder { radius, height } => {
-            let rim = |index: usize, z: f64| {
-                let (sin, cos) = (TAU * index as f64 / RIM as f64).sin_cos();
-                DVec3::new(radius * cos, radius * sin, z * height)
-            };
-            let rims = (0..RIM).flat_map(|i| [[rim(i, -0.5), rim(i + 1, -0.5)], [rim(i, 0.5), rim(i + 1, 0.5)]]);
-            rims.chain((0..RIM).step_by(6).map(|i| [rim(i, -0.5), rim(i, 0.5)])).collect()
+            let half = 0.5 * height;
+            let uprights = (0..RIM).step_by(6).map(|i| [point(i, radius, -half), point(i, radius, half)]);
+            rim(radius, -half).chain(rim(radius, half)).chain(uprights).collect()
+        }
+        Solid::Revolved { profile } => {
+            let rims =
+                profile.corners().iter().filter(|corner| corner.x > 0.0).flat_map(|corner| rim(corner.x, corner.y));
+            let outer = profile.edges().filter(|[a, b]| b.y > a.y);
+            let uprights =
+                outer.flat_map(|[a, b]| (0..RIM).step_by(6).map(move |i| [point(i, a.x, a.y), point(i, b.x, b.y)]));
+            rims.chain(uprights).collect()
         }
     }
 }

@@ -3,7 +3,7 @@
 use acm_concept::{
     object::GroundedPart,
     pose::{Pose, wrap_angle},
-    solid::{PlacedSolid, Solid},
+    solid::{Enclosure, PlacedSolid},
     template::{TemplateLibrary, YawSymmetry},
 };
 use glam::{DVec2, DVec3};
@@ -44,10 +44,10 @@ impl Body {
         for part in parts {
             for placed in library.solids_of(part)? {
                 let pose = into_main * part.pose.pose * placed.pose;
-                let half = PlacedSolid { solid: placed.solid, pose }.half_extents();
-                (low, high) = (low.min(pose.translation - half), high.max(pose.translation + half));
-                radius = match (radius, placed.solid) {
-                    (Some(largest), Solid::Cylinder { radius, .. })
+                let ends = PlacedSolid { solid: placed.solid, pose }.bounds();
+                (low, high) = (low.min(ends.0), high.max(ends.1));
+                radius = match (radius, placed.solid.enclosure()) {
+                    (Some(largest), Enclosure::Cylinder { radius, .. })
                         if pose.translation.truncate().length() < 1e-3
                             && pose.transform_vector(DVec3::Z).z.abs() > 0.99 =>
                     {

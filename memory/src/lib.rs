@@ -15,7 +15,7 @@
 //! | [`FeltJoint`] | a part's hinge or slide as the hand that moved it felt it |
 //!
 //! [`AcmMemory`] is the implementation, in memory or over a folder; the library of templates comes from
-//! [`default_library`] or [`library_from_dir`].
+//! [`default_library`], [`library_of`] some groups or [`library_from_dir`].
 
 mod belief;
 mod draft;
@@ -52,7 +52,9 @@ mod view;
 pub use hand::HandFeeling;
 pub use identity::{IdentityRule, MAX_PERCEPTS};
 pub use joint::FeltJoint;
-pub use library::{LibraryError, MAX_TEMPLATE_FILES, default_library, library_from_dir};
+pub use library::{
+    CORE, LibraryError, MAX_TEMPLATE_FILES, default_library, library_from_dir, library_groups, library_of,
+};
 pub use log::{FORMAT, MAX_LOG_BYTES, read_events};
 pub use memory::AcmMemory;
 pub use recent::{MAX_RECENT, Recent};

@@ -1,7 +1,7 @@
 //! The semantic and template libraries: the embedded one, or a folder of template files.
 
 use acm_concept::template::{MAX_TEMPLATE_BYTES, TemplateError, TemplateLibrary};
-use include_dir::{Dir, include_dir};
+use include_dir::{Dir, File, include_dir};
 use std::{
     fs, io,
     path::{Path, PathBuf},
@@ -32,26 +32,66 @@ pub enum LibraryError {
         /// What is wrong and what is allowed.
         reason: String,
     },
+    /// A group that the library does not have.
+    #[error("template library: there is no group `{group}`; the groups are {known}")]
+    UnknownGroup {
+        /// The group.
+        group: String,
+        /// The groups there are.
+        known: String,
+    },
     /// A template file that makes no sense.
     #[error(transparent)]
     Template(#[from] TemplateError),
 }
 
-/// The library that ships inside the program.
+/// The group of the files that lie in the library's folder itself: what perception tries on every segment, unless it is
+/// told otherwise. Every other group is a folder in it.
+pub const CORE: &str = "core";
+
+/// The library that ships inside the program, as far as it is used unless something else is asked for: the group
+/// [`CORE`].
 ///
 /// ```
 /// let library = acm_memory::default_library().unwrap();
 /// assert!(library.with_noun("cube").any(|template| template.name == "box"));
 /// ```
 pub fn default_library() -> Result<TemplateLibrary, TemplateError> {
-    let texts = EMBEDDED.files().filter_map(|file| {
-        let name = file.path().file_name()?.to_str()?;
-        name.ends_with(".toml").then(|| Some((name, file.contents_utf8()?))).flatten()
-    });
-    TemplateLibrary::parse(texts)
+    TemplateLibrary::parse(texts(&EMBEDDED))
 }
 
-/// The library in a folder: every file `*.toml` in it is a template.
+/// The groups of the library that ships inside the program, [`CORE`] first.
+pub fn library_groups() -> Vec<&'static str> {
+    let mut groups: Vec<&str> = EMBEDDED.dirs().filter_map(|dir| dir.path().to_str()).collect();
+    groups.sort_unstable();
+    groups.insert(0, CORE);
+    groups
+}
+
+/// These groups of the library that ships inside the program, together.
+///
+/// ```
+/// let library = acm_memory::library_of(&["core", "tableware"]).unwrap();
+/// assert!(library.get("mug").is_some() && library.get("hammer").is_none());
+/// assert!(acm_memory::library_of(&["tablewear"]).unwrap_err().to_string().contains("tableware"));
+/// ```
+pub fn library_of(groups: &[&str]) -> Result<TemplateLibrary, LibraryError> {
+    let mut files = Vec::new();
+    for group in groups {
+        let folder = if *group == CORE { Some(&EMBEDDED) } else { EMBEDDED.get_dir(group) };
+        let unknown = || LibraryError::UnknownGroup { group: (*group).into(), known: library_groups().join(", ") };
+        files.extend(texts(folder.ok_or_else(unknown)?));
+    }
+    Ok(TemplateLibrary::parse(files)?)
+}
+
+/// The template files that lie in a folder itself: name and text.
+fn texts(folder: &'static Dir<'_>) -> impl Iterator<Item = (&'static str, &'static str)> {
+    let read = |file: &'static File<'_>| Some((file.path().to_str()?, file.contents_utf8()?));
+    folder.files().filter_map(read).filter(|(name, _)| name.ends_with(".toml"))
+}
+
+/// The library in a folder: every file `*.toml` in it is a template. Folders in it are groups, each a library of its own.
 pub fn library_from_dir(dir: &Path) -> Result<TemplateLibrary, LibraryError> {
     let io_error = |path: &Path, source| LibraryError::Io { path: path.into(), source };
     let size_error = |path: &Path, reason: String| LibraryError::Size { path: path.into(), reason };
@@ -92,6 +132,17 @@ mod tests {
         let embedded = default_library().unwrap();
         assert_eq!(library_from_dir(&folder).unwrap(), embedded);
         assert!(embedded.iter().count() >= 4);
+        for group in library_groups().into_iter().filter(|group| *group != CORE) {
+            assert_eq!(library_from_dir(&folder.join(group)).unwrap(), library_of(&[group]).unwrap());
+        }
+    }
+
+    #[test]
+    fn all_groups_fit_together_and_what_is_tried_by_default_are_the_plain_ones() {
+        let all = library_of(&library_groups()).unwrap();
+        assert!(all.iter().filter(|template| template.stands_alone).count() >= 50);
+        assert!(default_library().unwrap().iter().all(|template| template.stands_alone));
+        assert_eq!(library_of(&[CORE]).unwrap(), default_library().unwrap());
     }
 
     #[test]

@@ -1,18 +1,24 @@
 //! The pipeline: frame and expectation in, percepts out.
 
 mod assemble;
+mod assisted;
 mod bases;
+mod beliefs;
 mod completion;
+mod single;
+
+pub use assisted::{Assisted, AssistedGrounder};
+pub(crate) use single::{Refusal, Single};
 
 use crate::{
     config::GrounderConfig,
     expected::{self, Remembered},
     fit::{Base, Evidence},
     hypotheses::{self, Context, Hypothesis, Measured},
-    joins, own, patches,
+    own, patches,
     scan::Scan,
     scene::Scene,
-    segments::{self, NONE},
+    segments::NONE,
     support::{self, Plane, Upright},
 };
 use acm_concept::{
@@ -21,6 +27,7 @@ use acm_concept::{
     object::{Blindness, GroundedObject, Percepts, SupportPlane},
     template::{SeenBy, TemplateLibrary},
 };
+use assisted::Aid;
 use bases::Bodies;
 use glam::{DVec2, DVec3};
 use std::sync::Arc;
@@ -55,36 +62,49 @@ impl Grounder {
     /// Poses are in the world of the frame's nominal camera pose, metres; heights are over the plane that is found,
     /// not over a nominal one.
     pub fn ground(&self, frame: &RgbdFrame, expectation: &Expectation) -> Percepts {
-        let blind = |blindness, depth_fraction| self.blind(frame, expectation, blindness, depth_fraction);
-        let scan = match Scan::read(frame, &self.config) {
-            Ok(scan) => scan,
-            Err((blindness, depth_fraction)) => return blind(blindness, depth_fraction),
+        self.ground_with(frame, expectation, &mut Aid::none())
+    }
+
+    fn ground_with(&self, frame: &RgbdFrame, expectation: &Expectation, aid: &mut Aid) -> Percepts {
+        let read = |scene: &Scene, support: &SupportPlane| {
+            let camera_pose = &frame.header.camera_pose;
+            let remembered = Remembered::cast(scene, camera_pose, support, expectation, &self.library);
+            let mut objects = self.objects(scene, expectation, &remembered, aid);
+            objects.retain(|object| object.confidence >= self.config.min_confidence);
+            completion::complete(scene, camera_pose, &self.library, &mut objects);
+            objects.sort_by(|a, b| b.support.count.cmp(&a.support.count).then(a.support.runs.cmp(&b.support.runs)));
+            objects.truncate(self.config.max_objects);
+            expected::hint(&remembered, &mut objects, &self.library);
+            Percepts {
+                frame: frame.header.clone(),
+                support: Some(*support),
+                objects,
+                expected: expected::views(&remembered),
+                blindness: None,
+                depth_fraction: scene.scan.depth_fraction,
+            }
         };
+        self.in_scene(frame, expectation, read)
+            .unwrap_or_else(|(blindness, depth_fraction)| self.blind(frame, expectation, blindness, depth_fraction))
+    }
+
+    /// Reads a frame up to the surface on which things stand; of a frame that shows none its blindness and the share of
+    /// its pixels with a depth.
+    fn in_scene<R>(
+        &self,
+        frame: &RgbdFrame,
+        expectation: &Expectation,
+        read: impl FnOnce(&Scene, &SupportPlane) -> R,
+    ) -> Result<R, (Blindness, f64)> {
+        let scan = Scan::read(frame, &self.config)?;
         let own = own::pixels(&scan, &frame.header.camera_pose, &expectation.robot, &self.config);
         let up = frame.header.camera_pose.rotation.inverse() * DVec3::Z;
         let upright = Upright { up, max_angle_rad: self.config.max_support_tilt_rad };
-        let Some(plane) = support::find(&scan, &own, upright, &self.config) else {
-            return blind(Blindness::NoSupport, scan.depth_fraction);
-        };
+        let plane =
+            support::find(&scan, &own, upright, &self.config).ok_or((Blindness::NoSupport, scan.depth_fraction))?;
         let scene = Scene::new(&scan, &plane, &frame.header.camera_pose, own, &self.config);
         let support = support_plane(&scene, &plane);
-        let camera_pose = &frame.header.camera_pose;
-        let remembered = Remembered::cast(&scene, camera_pose, &support, expectation, &self.library);
-        let mut objects = self.objects(&scene, expectation, &remembered);
-        objects.retain(|object| object.confidence >= self.config.min_confidence);
-        completion::complete(&scene, camera_pose, &self.library, &mut objects);
-        objects.sort_by(|a, b| b.support.count.cmp(&a.support.count).then(a.support.runs.cmp(&b.support.runs)));
-        objects.truncate(self.config.max_objects);
-        expected::hint(&remembered, &mut objects, &self.library);
-        let expected = expected::views(&remembered);
-        Percepts {
-            frame: frame.header.clone(),
-            support: Some(support),
-            objects,
-            expected,
-            blindness: None,
-            depth_fraction: scan.depth_fraction,
-        }
+        Ok(read(&scene, &support))
     }
 
     fn blind(
@@ -104,10 +124,13 @@ impl Grounder {
         }
     }
 
-    fn objects(&self, scene: &Scene, expectation: &Expectation, remembered: &Remembered) -> Vec<GroundedObject> {
-        let mut segments = segments::split(scene);
-        expected::split(scene, remembered, &mut segments);
-        expected::merge(remembered, &mut segments);
+    fn objects(
+        &self,
+        scene: &Scene,
+        expectation: &Expectation,
+        remembered: &Remembered,
+        aid: &mut Aid,
+    ) -> Vec<GroundedObject> {
         let unremembered = Context {
             library: &self.library,
             config: &self.config,
@@ -116,8 +139,8 @@ impl Grounder {
             displaced: &remembered.displaced,
             remembered: None,
         };
-        // What is hollow or cut in two is told by upright solids alone: they are many, and most are refused.
-        joins::join(scene, &mut segments, Context { lying: false, displaced: &[], ..unremembered });
+        let mut segments = self.segments(scene, unremembered, remembered);
+        aid.cut(scene, &expectation.nouns, &mut segments);
         let standing: Vec<bool> = segments.labels.iter().map(|label| *label != NONE).collect();
         let context = |remembered| Context { remembered, ..unremembered };
         let (mut objects, mut bodies) = (Vec::new(), Bodies::default());
@@ -145,23 +168,30 @@ impl Grounder {
         for (lowest_m, pixels, evidence) in pieces {
             let plan: Vec<DVec2> = evidence.points.iter().map(|p| p.position.truncate()).collect();
             let context = context(remembered.at(&pixels, SeenBy::Depth));
-            let rank = |base: Base| {
-                let (Base::At(bottom) | Base::Free(bottom)) = base;
-                let height_m = evidence.top_m() - bottom;
-                let measured = Measured { plan: plan.clone(), height_m, base, seen_by: SeenBy::Depth };
-                hypotheses::rank(context, &measured, &evidence)
-            };
-            // What seems to hang in the air may hide what it stands on.
-            let ranked = match bodies.base_under(&plan, lowest_m, &evidence) {
-                free @ Base::Free(_) => better(rank(free), rank(Base::At(0.0))),
-                base => rank(base),
-            };
+            let base = bodies.base_under(&plan, lowest_m, &evidence);
+            let mut ranked = rank_on(context, &plan, &evidence, base);
+            aid.advise(scene, context, &evidence, &pixels, &mut ranked);
             if let Some(object) = assemble::object(scene, context, &ranked, &evidence, &pixels, 1.0) {
                 bodies.add(&ranked);
                 objects.push(object);
             }
         }
         objects
+    }
+}
+
+/// The templates that can explain a segment on a base. What seems to hang in the air may hide what it stands on, and is
+/// tried on the plane too.
+fn rank_on<'a>(context: Context<'a>, plan: &[DVec2], evidence: &Evidence, base: Base) -> Vec<Hypothesis<'a>> {
+    let rank = |base: Base| {
+        let (Base::At(bottom) | Base::Free(bottom)) = base;
+        let height_m = evidence.top_m() - bottom;
+        let measured = Measured { plan: plan.to_vec(), height_m, base, seen_by: SeenBy::Depth };
+        hypotheses::rank(context, &measured, evidence)
+    };
+    match base {
+        free @ Base::Free(_) => better(rank(free), rank(Base::At(0.0))),
+        base => rank(base),
     }
 }
 

@@ -14,6 +14,7 @@
 //! | `measure`, `fit`, `hypotheses` | first guesses, template fits, the choice among templates |
 //! | [`given`] | first guess and fit of things whose pixels are given |
 //! | `expected`, `raster` | the comparison with memory's expectation, ray-cast |
+//! | [`tools`] | tools that help: traits, the geometric default, what every implementation must pass |
 //! | [`overlay`], [`labels`], [`metrics`] | pictures for a person, label images, segmentation scores |
 //!
 //! [`Blindness`]: acm_concept::object::Blindness
@@ -26,6 +27,7 @@ pub mod labels;
 pub mod level;
 pub mod metrics;
 pub mod overlay;
+pub mod tools;
 
 mod expected;
 mod fit;
@@ -42,5 +44,5 @@ mod segments;
 mod support;
 
 pub use config::GrounderConfig;
-pub use grounder::Grounder;
+pub use grounder::{Assisted, AssistedGrounder, Grounder};
 pub use level::level;

@@ -7,7 +7,7 @@ use crate::{expected, labels};
 use acm_concept::{
     camera::RgbdFrame,
     object::{Blindness, GroundedObject, Observability, Percepts},
-    solid::{PlacedSolid, Solid},
+    solid::{Enclosure, PlacedSolid},
     template::TemplateLibrary,
 };
 use font::Font;
@@ -102,8 +102,8 @@ fn size_text(object: &GroundedObject, library: &TemplateLibrary) -> String {
     let mark = if unsure && !flat { "~" } else { "" };
     let centimetres = |metres: f64| format!("{:.1}", metres * 100.0);
     let size = match (expected::solids(&object.parts, library).as_slice(), library.extents_of(&object.parts)) {
-        ([PlacedSolid { solid: Solid::Cylinder { radius, height }, .. }], _) => {
-            format!("D{}x{}", centimetres(2.0 * radius), centimetres(*height))
+        ([PlacedSolid { solid, .. }], _) if let Enclosure::Cylinder { radius, height } = solid.enclosure() => {
+            format!("D{}x{}", centimetres(2.0 * radius), centimetres(height))
         }
         (_, Some(size)) => size.to_array().map(centimetres).join("x"),
         (_, None) => part.template.clone(),

@@ -30,5 +30,9 @@ fn grow(solid: Solid, margin_m: f64) -> Solid {
         Solid::Cylinder { radius, height } => {
             Solid::Cylinder { radius: radius + margin_m, height: height + 2.0 * margin_m }
         }
+        Solid::Ellipsoid { size } => Solid::Ellipsoid { size: size + DVec3::splat(2.0 * margin_m) },
+        Solid::Revolved { profile } => {
+            Solid::Cylinder { radius: profile.radius() + margin_m, height: profile.height() + 2.0 * margin_m }
+        }
     }
 }

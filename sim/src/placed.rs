@@ -11,7 +11,11 @@ use crate::{
     scenario::{ObjectSpec, RawPerturb},
     texture::{self, with_hue},
 };
-use acm_concept::{expression::Expression, pose::Pose, solid::Solid};
+use acm_concept::{
+    expression::Expression,
+    pose::Pose,
+    solid::{Enclosure, Solid},
+};
 use acm_render::Pattern;
 use glam::DVec3;
 use rand::{Rng, SeedableRng};
@@ -251,9 +255,9 @@ fn deviation(perturb: Option<RawPerturb>, details: &mut ChaCha8Rng) -> (DVec3, f
 
 fn perturbed(piece: &Piece, grow: DVec3, bevel: f64) -> Piece {
     let Shape::Solid(exact) = piece.shape else { return piece.clone() };
-    let grown = match exact {
-        Solid::Box { size } => Solid::Box { size: (size + grow).max(size * 0.5) },
-        Solid::Cylinder { radius, height } => Solid::Cylinder {
+    let grown = match exact.enclosure() {
+        Enclosure::Box { size } => Solid::Box { size: (size + grow).max(size * 0.5) },
+        Enclosure::Cylinder { radius, height } => Solid::Cylinder {
             radius: (radius + 0.5 * grow.x).max(radius * 0.5),
             height: (height + grow.z).max(height * 0.5),
         },

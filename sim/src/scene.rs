@@ -5,7 +5,10 @@ use crate::{
     model::{Piece, shape::Shape},
     world::World,
 };
-use acm_concept::{pose::Pose, solid::Solid};
+use acm_concept::{
+    pose::Pose,
+    solid::{Enclosure, Solid},
+};
 use acm_render::{Instance, Material, Mesh, MeshError, Scene};
 use glam::{DVec3, Vec3};
 use std::sync::Arc;
@@ -97,9 +100,9 @@ impl Stage {
     }
 
     fn instance(&self, solid: &Solid, pose: Pose, material: Material, id: u32) -> Instance {
-        let (mesh, scale) = match *solid {
-            Solid::Box { size } => (&self.cuboid, size),
-            Solid::Cylinder { radius, height } => (&self.cylinder, DVec3::new(radius, radius, height)),
+        let (mesh, scale) = match solid.enclosure() {
+            Enclosure::Box { size } => (&self.cuboid, size),
+            Enclosure::Cylinder { radius, height } => (&self.cylinder, DVec3::new(radius, radius, height)),
         };
         Instance { mesh: mesh.clone(), pose, scale, material, id }
     }

@@ -8,7 +8,7 @@ use crate::{
     },
     scene,
 };
-use acm_concept::{pose::Pose, solid::Solid};
+use acm_concept::{pose::Pose, solid::Enclosure};
 use acm_render::{Mesh, MeshError};
 use glam::DVec3;
 use std::{path::Path, sync::Arc};
@@ -56,10 +56,12 @@ pub fn surfaces(model_file: &str) -> Result<Vec<Surface>, SurfacesError> {
                 found.push(Surface { mesh, scale, pose, color: piece.color });
             };
             match &piece.shape {
-                Shape::Solid(Solid::Box { size }) => add(Arc::new(Mesh::unit_box()), pose, *size),
-                Shape::Solid(Solid::Cylinder { radius, height }) => {
-                    add(Arc::new(Mesh::unit_cylinder()), pose, DVec3::new(*radius, *radius, *height));
-                }
+                Shape::Solid(solid) => match solid.enclosure() {
+                    Enclosure::Box { size } => add(Arc::new(Mesh::unit_box()), pose, size),
+                    Enclosure::Cylinder { radius, height } => {
+                        add(Arc::new(Mesh::unit_cylinder()), pose, DVec3::new(radius, radius, height));
+                    }
+                },
                 Shape::Capsule { radius, height } => {
                     add(Arc::new(Mesh::unit_cylinder()), pose, DVec3::new(*radius, *radius, *height));
                     for end in [-0.5, 0.5] {

@@ -1,8 +1,19 @@
 //! The guides in docs/ are true: their examples are accepted and their tables are complete.
 
 use super::{files, read, root};
-use acm_concept::{literal::Literal, template::Template};
+use acm_concept::{
+    camera::{FrameHeader, Intrinsics, RgbdFrame},
+    ids::FrameId,
+    literal::Literal,
+    pose::Pose,
+    solid::PlacedSolid,
+    template::{Template, TemplateLibrary},
+    time::Time,
+};
 use anyhow::{Context, Result};
+use glam::{DMat3, DQuat, DVec3};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 use std::collections::BTreeSet;
 
 /// The fenced blocks of a language, without their fences.
@@ -28,19 +39,124 @@ fn the_worked_template_is_accepted() -> Result<()> {
     let guide = read(&root().join("docs/templates.md"))?;
     let example = blocks(&guide, "toml").first().copied().context("docs/templates.md has no example")?;
     let template = Template::parse("docs/templates.md", example)?;
-    // A ruler of 30 cm as a segment of that size would be measured.
-    let values = template.initial_values([0.3, 0.03, 0.009, 0.15])?;
+    // A pot of 12 cm as a segment of that size would be measured.
+    let values = template.initial_values([0.12, 0.12, 0.1, 0.06])?;
     let named = template.named(&values);
     assert!(template.admits(&named));
-    assert_eq!(template.nouns(&named), ["ruler", "bar"]);
+    assert_eq!(template.nouns(&named), ["pot"]);
     assert_eq!(template.solids(&named)?.len(), 1);
+    assert_eq!(unbound(&template)?, Vec::<String>::new());
+    Ok(())
+}
+
+/// Functions of a template that no controller runs, or that lack an argument which theirs needs.
+fn unbound(template: &Template) -> Result<Vec<String>> {
+    let mut wrong = Vec::new();
     for function in &template.functions {
-        assert!(acm_skills::kinds().contains(&function.kind.as_str()), "no controller runs `{}`", function.kind);
-        assert!(template.frame(&function.frame, &named)?.is_some());
-        let required = acm_skills::required_arguments(&function.kind).context("a kind that nothing runs")?;
-        let unbound: Vec<_> = required.iter().filter(|name| !function.arguments.contains_key(**name)).collect();
-        assert_eq!(unbound, Vec::<&&str>::new(), "`{}` of the worked template", function.name);
+        let Some(required) = acm_skills::required_arguments(&function.kind) else {
+            wrong.push(format!("{}: no controller runs `{}`", template.name, function.kind));
+            continue;
+        };
+        let missing = required.iter().filter(|name| !function.arguments.contains_key(**name));
+        wrong.extend(missing.map(|name| format!("{}: `{}` lacks `{name}`", template.name, function.name)));
     }
+    Ok(wrong)
+}
+
+#[test]
+fn a_view_of_the_worked_template_is_grounded() -> Result<()> {
+    let guide = read(&root().join("docs/templates.md"))?;
+    let example = blocks(&guide, "toml").first().copied().context("docs/templates.md has no example")?;
+    // Beside what is tried anyway.
+    let mut texts = vec![("docs/templates.md".to_owned(), example.to_owned())];
+    for entry in std::fs::read_dir(root().join("memory/library"))? {
+        let path = entry?.path();
+        if path.is_file() {
+            texts.push((path.display().to_string(), read(&path)?));
+        }
+    }
+    let library = TemplateLibrary::parse(texts.iter().map(|(file, text)| (file.as_str(), text.as_str())))?;
+    let template = library.get("plant-pot").context("the example has another name")?;
+    let truth = [0.04, 0.055, 0.09];
+    let frame = view(&template.solids(&template.named(&truth))?)?;
+    let grounder = acm_perception::Grounder::new(library.clone().into(), acm_perception::GrounderConfig::default());
+    let percepts = grounder.ground(&frame, &acm_concept::expectation::Expectation::default());
+    let part = percepts.objects.first().and_then(|object| object.parts.first()).context("nothing is seen")?;
+    assert_eq!(part.template, template.name);
+    let height = part.parameters.iter().find(|parameter| parameter.name == "height").context("it has no height")?;
+    assert!((height.value - truth[2]).abs() < 0.006, "{}", height.value);
+    let rim = part.parameters.iter().find(|parameter| parameter.name == "radius_top").context("it has no rim")?;
+    assert!((rim.value - truth[1]).abs() < 0.006, "{}", rim.value);
+    assert!(part.pose.pose.translation.length() < 0.01, "{}", part.pose.pose.translation);
+    Ok(())
+}
+
+/// What a camera sees of some solids on the plane z = 0 from 0.7 m, with a depth noise of a millimetre.
+fn view(solids: &[PlacedSolid]) -> Result<RgbdFrame> {
+    let (width, height) = (320, 240);
+    let intrinsics = Intrinsics::from_vertical_fov(width, height, 0.8);
+    let ahead = DVec3::new(0.0, 0.55, -0.83).normalize();
+    let axes = DMat3::from_cols(DVec3::X, ahead.cross(DVec3::X), ahead);
+    let camera = Pose::new(-ahead * 0.7, DQuat::from_mat3(&axes).normalize());
+    let mut noise = ChaCha8Rng::seed_from_u64(5);
+    let (mut color, mut depth) = (Vec::new(), Vec::new());
+    for index in 0..intrinsics.pixels() {
+        let pixel = (index % width as usize, index / width as usize);
+        let ray = camera.transform_vector(intrinsics.ray(pixel.0 as f64, pixel.1 as f64));
+        let thing = solids.iter().filter_map(|s| s.intersect_ray(camera.translation, ray)).map(|(enter, _)| enter);
+        let (thing, table) = (thing.fold(f64::INFINITY, f64::min), -camera.translation.z / ray.z);
+        color.extend(if thing < table { [190, 90, 60] } else { [215, 215, 210] });
+        depth.push((thing.min(table) + noise.random_range(-0.0017..0.0017)) as f32);
+    }
+    let header =
+        FrameHeader { id: FrameId(0), camera: "head".into(), time: Time::ZERO, intrinsics, camera_pose: camera };
+    Ok(RgbdFrame::new(header, color.into(), depth.into())?)
+}
+
+#[test]
+fn controllers_run_every_function_of_the_library() -> Result<()> {
+    let mut wrong = Vec::new();
+    let library = acm_memory::library_of(&acm_memory::library_groups())?;
+    for template in library.iter() {
+        wrong.extend(unbound(template)?);
+    }
+    assert_eq!(wrong, Vec::<String>::new());
+    Ok(())
+}
+
+#[test]
+fn the_gallery_shows_the_library_as_it_is() -> Result<()> {
+    let redo = "draw it anew: acm library --gallery docs";
+    assert!(read(&root().join("docs/library.md"))? == acm::library::gallery()?, "docs/library.md differs; {redo}");
+    let folder = root().join("docs/library");
+    let library = acm_memory::library_of(&acm_memory::library_groups())?;
+    assert_eq!(files(&folder, "png")?.len(), library.iter().count(), "docs/library; {redo}");
+    for template in library.iter() {
+        let path = folder.join(format!("{}.png", template.name));
+        let drawn = acm::library::picture(template)?;
+        let kept = image::open(&path).with_context(|| path.display().to_string())?.to_rgb8();
+        assert_eq!(kept.dimensions(), drawn.dimensions(), "{}; {redo}", path.display());
+        assert!(std::fs::metadata(&path)?.len() < 6 * 1024, "{} is larger than 6 kB", path.display());
+        // Another processor may round an edge otherwise.
+        let far = |(a, b): (&image::Rgb<u8>, &image::Rgb<u8>)| a.0.iter().zip(b.0).any(|(a, b)| a.abs_diff(b) > 12);
+        let differ = kept.pixels().zip(drawn.pixels()).filter(|pair| far(*pair)).count();
+        assert!(differ < 100, "{}: {differ} pixels differ; {redo}", path.display());
+    }
+    Ok(())
+}
+
+#[test]
+fn the_tools_guide_shows_settings_that_are_read_and_names_every_field() -> Result<()> {
+    let guide = read(&root().join("docs/perception-tools.md"))?;
+    let example = blocks(&guide, "toml").first().copied().context("docs/perception-tools.md has no example")?;
+    let settings: acm_actors::settings::Settings = toml::from_str(example)?;
+    settings.tools.check().map_err(anyhow::Error::msg)?;
+    assert_eq!(settings.tools.named().count(), 2);
+    let named = table_names(&guide, "## Switching one on")?;
+    let text: Vec<String> = named.iter().filter(|name| **name != "deadline_ms").map(|n| format!("{n} = 'x'")).collect();
+    let all: acm_actors::tools::ToolSettings = toml::from_str(&text.join("\n"))?;
+    let fields: BTreeSet<&str> = all.named().map(|(field, _)| field).chain(["deadline_ms"]).collect();
+    assert_eq!((named, fields.len()), (fields.clone(), 6));
     Ok(())
 }
 

@@ -331,3 +331,45 @@ fn crc32(bytes: &[u8]) -> u32 {
     let bit = |crc: u32| if crc & 1 == 1 { (crc >> 1) ^ 0xedb8_8320 } else { crc >> 1 };
     !bytes.iter().fold(!0u32, |crc, byte| (0..8).fold(crc ^ u32::from(*byte), |crc, _| bit(crc)))
 }
+
+#[test]
+fn a_tool_that_nobody_serves_is_said_and_geometry_goes_on() {
+    let dir = tempfile::tempdir().unwrap();
+    story(dir.path());
+    // Nobody listens at a port that was just given back.
+    let address = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+    let config = dir.path().join("acm.toml");
+    fs::write(&config, format!("[tools]\nsegmenter = 'http://{address}'\n")).unwrap();
+    let (frames, config) = (dir.path().to_str().unwrap(), config.to_str().unwrap());
+    let document = json(&["--frames", frames, "--config", config], 0);
+    for frame in document["frames"].as_array().unwrap() {
+        let call = &frame["tools"][0];
+        assert_eq!((&call["asked"], &call["outcome"]), (&"segment".into(), &"failed".into()), "{call}");
+        assert_eq!(call["made"], "geometry's segments");
+    }
+    let alone = json(&["--frames", frames], 0);
+    let objects = |document: &Value| document["frames"][0]["objects"].clone();
+    assert_eq!(objects(&document), objects(&alone));
+    assert!(alone["frames"][0].get("tools").is_none());
+    let text = perceive(&["--frames", frames, "--config", config], 0);
+    assert!(text.contains("asked to segment: failed, cannot be reached"), "{text}");
+}
+
+#[test]
+fn tools_that_cannot_be_opened_and_runs_with_tools_are_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    story(dir.path());
+    let config = dir.path().join("acm.toml");
+    let (frames, path) = (dir.path().to_str().unwrap(), config.to_str().unwrap());
+    for (text, parts) in [
+        ("segmenter = 'localhost'", &["tools.segmenter", "localhost", "http://HOST:PORT"][..]),
+        ("pose_estimator = 'https://a.b'", &["tools.pose_estimator", "https://a.b"]),
+        ("param_estimator = 'onnx:no-such.onnx'", &["tools.param_estimator", "onnx"]),
+    ] {
+        fs::write(&config, format!("[tools]\n{text}\n")).unwrap();
+        let arguments = ["perceive", "--intrinsics", INTRINSICS_TEXT, "--frames", frames, "--config", path];
+        refuses(&arguments, &[&[path], parts].concat());
+    }
+    fs::write(&config, "[tools]\nsegmenter = 'http://127.0.0.1:1'\n").unwrap();
+    refuses(&["run", "put-back-block", "--config", path], &[path, "tools.segmenter", "replayed", "acm perceive"]);
+}

@@ -36,6 +36,9 @@ impl Vocabulary {
         let mut texts = Vec::new();
         for entry in std::fs::read_dir(folder).unwrap() {
             let path = entry.unwrap().path();
+            if path.is_dir() {
+                continue;
+            }
             let mut table: Table = std::fs::read_to_string(&path).unwrap().parse().unwrap();
             template(&mut table, &mut all, &mut spoken);
             let name = mirrored(path.file_stem().unwrap().to_str().unwrap());

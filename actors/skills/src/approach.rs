@@ -11,7 +11,7 @@ use crate::{
 use acm_concept::{
     embodiment::RobotDescription,
     pose::Pose,
-    solid::{PlacedSolid, Solid},
+    solid::{Enclosure, PlacedSolid},
 };
 use glam::{DQuat, DVec3};
 use std::f64::consts::PI;
@@ -208,7 +208,7 @@ fn surface(part: &PlacedSolid) -> Vec<DVec3> {
                 }
                 let mut point =
                     DVec3::new(at(i, counts[0], half.x), at(j, counts[1], half.y), at(k, counts[2], half.z));
-                if let Solid::Cylinder { radius, .. } = part.solid {
+                if let Enclosure::Cylinder { radius, .. } = part.solid.enclosure() {
                     let flat = point.truncate().clamp_length_max(radius);
                     point = flat.extend(point.z);
                 }

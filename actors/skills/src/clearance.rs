@@ -10,7 +10,7 @@ use acm_concept::{
     ids::ObjectId,
     pose::Pose,
     skill::SkillInvocation,
-    solid::{PlacedSolid, Solid},
+    solid::{Enclosure, PlacedSolid},
 };
 use glam::{DVec2, DVec3};
 
@@ -77,7 +77,8 @@ fn lower_face(part: &PlacedSolid) -> Vec<DVec3> {
         for row in 0..=rows {
             let x = half.x * (2.0 * f64::from(column) / f64::from(columns) - 1.0);
             let y = half.y * (2.0 * f64::from(row) / f64::from(rows) - 1.0);
-            let outside = matches!(part.solid, Solid::Cylinder { radius, .. } if x.hypot(y) > radius + 1e-9);
+            let outside =
+                matches!(part.solid.enclosure(), Enclosure::Cylinder { radius, .. } if x.hypot(y) > radius + 1e-9);
             if !outside {
                 points.push(part.pose.transform_point(DVec3::new(x, y, half.z)));
             }
@@ -145,6 +146,7 @@ fn out_of_reach(robot: &RobotDescription, what: &'static str, position: DVec3) -
 mod tests {
     use super::*;
     use crate::geometry::downward;
+    use acm_concept::solid::Solid;
     use proptest::prelude::*;
 
     fn robot() -> RobotDescription {

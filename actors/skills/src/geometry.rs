@@ -3,7 +3,7 @@
 use acm_concept::{
     embodiment::RobotDescription,
     pose::{Pose, wrap_angle},
-    solid::{PlacedSolid, Solid},
+    solid::PlacedSolid,
 };
 use glam::{DQuat, DVec3};
 use std::f64::consts::PI;
@@ -31,11 +31,7 @@ pub(crate) fn nearest_heading(heading_rad: f64, reference_rad: f64) -> f64 {
 
 /// How far a solid reaches from its centre along a unit direction of its parent frame, metres.
 fn reach_along(part: &PlacedSolid, direction: DVec3) -> f64 {
-    let local = part.pose.rotation.inverse() * direction;
-    match part.solid {
-        Solid::Box { size } => (local.abs() * size * 0.5).element_sum(),
-        Solid::Cylinder { radius, height } => local.x.hypot(local.y) * radius + local.z.abs() * height * 0.5,
-    }
+    part.solid.reach(part.pose.rotation.inverse() * direction)
 }
 
 /// World height of a solid's highest point, metres.
@@ -63,6 +59,7 @@ pub(crate) fn hand_radius_m(robot: &RobotDescription) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use acm_concept::solid::Solid;
     use proptest::prelude::*;
 
     #[test]

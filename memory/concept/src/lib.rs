@@ -7,7 +7,7 @@
 //! | module | holds |
 //! |---|---|
 //! | [`ids`], [`time`], [`pose`], [`color`] | readable ids, virtual time, rigid motions, appearance |
-//! | [`solid`], [`expression`], [`template`] | solids, expressions over parameters, the template library |
+//! | [`solid`], [`mesh`], [`expression`], [`template`] | solids and their triangles, expressions over parameters, the template library |
 //! | [`object`] | grounded parts and objects as perception reports them |
 //! | [`literal`] | state literals and three-valued truth |
 //! | [`camera`], [`plane`] | frames and their pixels, calibration |
@@ -27,6 +27,7 @@ pub mod expectation;
 pub mod expression;
 pub mod ids;
 pub mod literal;
+pub mod mesh;
 pub mod object;
 pub mod plane;
 pub mod pose;

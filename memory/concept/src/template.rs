@@ -6,14 +6,17 @@
 
 mod raw;
 mod rest;
+mod shape;
+mod typical;
 
 pub use rest::Rest;
+use shape::SolidSpec;
 
 use crate::{
     expression::{Expression, ExpressionError},
     literal::{Literal, ParseLiteralError},
     pose::Pose,
-    solid::{PlacedSolid, Solid},
+    solid::PlacedSolid,
 };
 use glam::{DQuat, DVec3};
 use serde::{Deserialize, Serialize};
@@ -107,6 +110,8 @@ pub struct PartSpec {
     /// Affordance words of this part.
     pub affordances: Vec<String>,
     position: [Expression; 3],
+    /// Rotation about the base frame's z axis, after the tilt, radians.
+    yaw: Expression,
     /// Rotation about the base frame's y axis, radians.
     tilt: Expression,
 }
@@ -114,26 +119,13 @@ pub struct PartSpec {
 /// The name of the part of templates that name none.
 pub const WHOLE: &str = "whole";
 
-/// A solid as expressions over the parameters, in the frame of its part.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SolidSpec {
-    /// Index of the part it belongs to.
-    part: usize,
-    shape: ShapeSpec,
-    position: [Expression; 3],
-}
-
-#[derive(Debug, Clone, PartialEq)]
-enum ShapeSpec {
-    Box { size: [Expression; 3] },
-    Cylinder { radius: Expression, height: Expression },
-}
-
 /// A named frame of the part, as expressions over the parameters. Its z axis points out of the part.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FrameSpec {
     /// Name that function bindings refer to.
     pub name: String,
+    /// Index of the part with which it moves; `None` for the base frame.
+    part: Option<usize>,
     position: [Expression; 3],
     yaw: Expression,
     /// Takes z to the direction out of the part.
@@ -211,6 +203,8 @@ pub struct Template {
     pub seen_by: SeenBy,
     /// Prior odds against other templates that fit as well, 1 for the plain ones.
     pub prior: f64,
+    /// Whether such a thing is found by itself, as a cup is; a door or a handle is found on what it belongs to.
+    pub stands_alone: bool,
     /// Parts P_i, the main one first: manipulation functions are bound to it.
     pub parts: Vec<PartSpec>,
     /// Parameter space Omega.
@@ -279,11 +273,13 @@ pub enum TemplateError {
         /// The frames there are.
         known: String,
     },
-    /// A solid that names a part which the template does not have.
-    #[error("template file {file}: a solid belongs to part `{part}`, which is not among: {known}")]
+    /// A solid or frame that names a part which the template does not have.
+    #[error("template file {file}: {what} belongs to part `{part}`, which is not among: {known}")]
     UnknownPart {
         /// The file's name.
         file: String,
+        /// The solid or frame.
+        what: String,
         /// The part it names.
         part: String,
         /// The parts there are.
@@ -307,29 +303,43 @@ impl Template {
     /// The solids of all parts with the given parameter values, in the base frame.
     pub fn solids(&self, values: &Values) -> Result<Vec<PlacedSolid>, ExpressionError> {
         let frames = self.part_frames(values)?;
-        let place = |spec: &SolidSpec| {
-            let local = spec.evaluate(values)?;
+        let mut solids = Vec::with_capacity(self.solids.len());
+        for spec in &self.solids {
             let frame = frames.get(spec.part).copied().unwrap_or(Pose::IDENTITY);
-            Ok(PlacedSolid { solid: local.solid, pose: frame * local.pose })
-        };
-        self.solids.iter().map(place).collect()
+            let first = solids.len();
+            spec.evaluate(values, &mut solids)?;
+            for placed in solids.iter_mut().skip(first) {
+                placed.pose = frame * placed.pose;
+            }
+        }
+        Ok(solids)
     }
     /// The frames of the parts in the base frame, in their order.
     pub fn part_frames(&self, values: &Values) -> Result<Vec<Pose>, ExpressionError> {
         let frame = |part: &PartSpec| {
-            let tilt = glam::DQuat::from_rotation_y(part.tilt.evaluate(values)?);
-            Ok(Pose::new(vector(&part.position, values)?, tilt))
+            let tilt = DQuat::from_rotation_y(part.tilt.evaluate(values)?);
+            let yaw = part.yaw.evaluate(values)?;
+            let turn = if yaw == 0.0 { tilt } else { DQuat::from_rotation_z(yaw) * tilt };
+            Ok(Pose::new(vector(&part.position, values)?, turn))
         };
         self.parts.iter().map(frame).collect()
     }
     /// The solids of one part, in that part's frame; none if the template has no part of that name.
     pub fn part_solids(&self, part: &str, values: &Values) -> Result<Vec<PlacedSolid>, ExpressionError> {
         let index = self.parts.iter().position(|spec| spec.name == part);
-        self.solids.iter().filter(|spec| Some(spec.part) == index).map(|spec| spec.evaluate(values)).collect()
+        let mut solids = Vec::new();
+        for spec in self.solids.iter().filter(|spec| Some(spec.part) == index) {
+            spec.evaluate(values, &mut solids)?;
+        }
+        Ok(solids)
     }
     /// Affordance words of all parts.
     pub fn affordances(&self) -> impl Iterator<Item = &str> {
         self.parts.iter().flat_map(|part| part.affordances.iter().map(String::as_str))
+    }
+    /// Names of its frames.
+    pub fn frame_names(&self) -> impl Iterator<Item = &str> {
+        self.frames.iter().map(|frame| frame.name.as_str())
     }
     /// A frame of a part with the given parameter values, in its base frame; `None` if there is no such frame.
     pub fn frame(&self, name: &str, values: &Values) -> Result<Option<Pose>, ExpressionError> {
@@ -337,7 +347,9 @@ impl Template {
         let upright = Pose::from_yaw(vector(&spec.position, values)?, spec.yaw.evaluate(values)?);
         let turned = spec.out * DQuat::from_rotation_z(spec.turn.evaluate(values)?);
         let upright_alone = turned == DQuat::IDENTITY;
-        Ok(Some(if upright_alone { upright } else { upright * Pose::new(DVec3::ZERO, turned) }))
+        let own = if upright_alone { upright } else { upright * Pose::new(DVec3::ZERO, turned) };
+        let Some(part) = spec.part else { return Ok(Some(own)) };
+        Ok(self.part_frames(values)?.get(part).map(|frame| *frame * own))
     }
     /// The symmetry of a part with the given parameter values.
     pub fn yaw_symmetry(&self, values: &Values) -> Result<YawSymmetry, ExpressionError> {
@@ -402,18 +414,6 @@ impl Template {
     }
 }
 
-impl SolidSpec {
-    fn evaluate(&self, values: &Values) -> Result<PlacedSolid, ExpressionError> {
-        let solid = match &self.shape {
-            ShapeSpec::Box { size } => Solid::Box { size: vector(size, values)? },
-            ShapeSpec::Cylinder { radius, height } => {
-                Solid::Cylinder { radius: radius.evaluate(values)?, height: height.evaluate(values)? }
-            }
-        };
-        Ok(PlacedSolid { solid, pose: Pose::from_translation(vector(&self.position, values)?) })
-    }
-}
-
 fn greatest_common_divisor(a: u32, b: u32) -> u32 {
     if b == 0 { a } else { greatest_common_divisor(b, a % b) }
 }
@@ -442,6 +442,10 @@ impl TemplateLibrary {
         }
         Ok(TemplateLibrary { templates })
     }
+    /// The library of one template.
+    pub fn of_one(template: Template) -> TemplateLibrary {
+        TemplateLibrary { templates: BTreeMap::from([(template.name.clone(), template)]) }
+    }
     /// A template by type.
     pub fn get(&self, name: &str) -> Option<&Template> {
         self.templates.get(name)
@@ -458,8 +462,8 @@ impl TemplateLibrary {
         for part in parts {
             for placed in self.solids_of(part).unwrap_or_default() {
                 let pose = to_first * part.pose.pose * placed.pose;
-                let half = PlacedSolid { pose, ..placed }.half_extents();
-                (low, high) = (low.min(pose.translation - half), high.max(pose.translation + half));
+                let ends = PlacedSolid { pose, ..placed }.bounds();
+                (low, high) = (low.min(ends.0), high.max(ends.1));
             }
         }
         (low.x <= high.x).then(|| high - low)

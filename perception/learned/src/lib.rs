@@ -12,6 +12,7 @@
 //! | `net`, `weights` | the network and its weights (feature `candle`) |
 //! | `samples`, `train` | labelled clouds in a folder; training (feature `candle`) |
 //! | `estimator` | a cloud and a template in, an estimate with its uncertainty out (feature `candle`) |
+//! | `tool` | the estimator behind perception's trait `ParamEstimator` (feature `candle`) |
 //! | `onnx` | the same graph for other runtimes (feature `candle`) |
 //!
 //! [docs/learned.md]: https://github.com/acm-robotics/acm/blob/main/docs/learned.md
@@ -28,6 +29,8 @@ pub mod net;
 pub mod onnx;
 #[cfg(feature = "candle")]
 pub mod samples;
+#[cfg(feature = "candle")]
+pub mod tool;
 #[cfg(feature = "candle")]
 pub mod train;
 #[cfg(feature = "candle")]

@@ -48,8 +48,10 @@ pub(crate) struct Placement {
     pub values: Vec<f64>,
 }
 
-/// Circle points that stand for the rim of a cylinder in its outline.
+/// Circle points that stand for the rim of what is round in its outline.
 const RIM: usize = 24;
+/// Level slices that an ellipsoid's outline is made of.
+const SLICES: usize = 8;
 
 impl<'a> Model<'a> {
     /// A model whose parameters begin at `initial`; `None` if the template's symmetry cannot be evaluated.
@@ -120,8 +122,8 @@ impl<'a> Model<'a> {
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for solid in self.template.solids(&self.template.named(values)).unwrap_or_default() {
             let turned = PlacedSolid { solid: solid.solid, pose: turn * solid.pose };
-            let half = turned.half_extents();
-            (low, high) = (low.min(turned.pose.translation - half), high.max(turned.pose.translation + half));
+            let ends = turned.bounds();
+            (low, high) = (low.min(ends.0), high.max(ends.1));
         }
         if !(low.is_finite() && high.is_finite()) {
             return turn;
@@ -157,7 +159,7 @@ impl<'a> Model<'a> {
             residuals.push(if nearest.is_finite() { nearest / point.sigma_m } else { 1e3 });
         }
         let to_camera = evidence.camera.inverse();
-        let outlines: Vec<Vec<DVec2>> = solids.iter().map(|s| image_outline(s, &to_camera, evidence)).collect();
+        let outlines: Vec<Vec<DVec2>> = solids.iter().flat_map(|s| image_outlines(s, &to_camera, evidence)).collect();
         for point in &evidence.outline {
             let distance = |outline: &Vec<DVec2>| distance_outside(outline, point.pixel);
             let outside = outlines.iter().filter(|o| o.len() > 2).map(distance).fold(f64::INFINITY, f64::min);
@@ -168,30 +170,85 @@ impl<'a> Model<'a> {
     }
 }
 
-/// The outline of a solid in the image: the convex hull of its projected corners.
-fn image_outline(solid: &PlacedSolid, to_camera: &Pose, evidence: &Evidence) -> Vec<DVec2> {
+/// The outlines in the image of the convex pieces of a solid: together they cover what it does. The mouth of a vessel is
+/// covered as well; behind it lies the vessel's own inside.
+fn image_outlines(solid: &PlacedSolid, to_camera: &Pose, evidence: &Evidence) -> Vec<Vec<DVec2>> {
     let pose = *to_camera * solid.pose;
     let project = |corner: DVec3| evidence.intrinsics.project(pose.transform_point(corner));
-    convex_hull(corners(&solid.solid).into_iter().filter_map(project).collect())
+    let pieces = corners(&solid.solid);
+    let pieces = if matches!(solid.solid, Solid::Ellipsoid { .. }) { vec![pieces.concat()] } else { pieces };
+    pieces.into_iter().map(|piece| convex_hull(piece.into_iter().filter_map(project).collect())).collect()
 }
 
-/// Corners of a box, or points of both rims of a cylinder, in the solid's frame.
-pub(crate) fn corners(solid: &Solid) -> Vec<DVec3> {
+/// Corners of the convex pieces of a solid, in its frame: of a box, or points of both rims, in turn, of a cylinder and of
+/// each slice of what is round otherwise. Metres.
+pub(crate) fn corners(solid: &Solid) -> Vec<Vec<DVec3>> {
     match *solid {
         Solid::Box { size } => {
             let half = size * 0.5;
             let sign = |bit: usize| if bit == 0 { -1.0 } else { 1.0 };
-            (0..8).map(|i| half * DVec3::new(sign(i & 1), sign(i & 2), sign(i & 4))).collect()
+            vec![(0..8).map(|i| half * DVec3::new(sign(i & 1), sign(i & 2), sign(i & 4))).collect()]
         }
         Solid::Cylinder { radius, height } => {
-            // The polygon's mean radius, not its corners', equals the circle's.
-            let angle = std::f64::consts::TAU / RIM as f64;
-            let reach = radius * (1.0 + angle * angle / 24.0);
-            let point = |i: usize| {
-                let at = DVec2::from_angle(angle * (i / 2) as f64) * reach;
-                at.extend(if i.is_multiple_of(2) { -height * 0.5 } else { height * 0.5 })
+            vec![slice([DVec2::new(radius, -height * 0.5), DVec2::new(radius, height * 0.5)])]
+        }
+        // What falls along the profile is the inside of a vessel, and covers nothing.
+        Solid::Revolved { profile } => profile.edges().filter(|[a, b]| b.y > a.y).map(slice).collect(),
+        Solid::Ellipsoid { size } => {
+            let at = |step: usize| 0.5 * DVec2::from_angle(std::f64::consts::PI * (step as f64 / SLICES as f64 - 0.5));
+            let scaled = |piece: Vec<DVec3>| piece.into_iter().map(|point| point * size).collect();
+            (0..SLICES).map(|step| scaled(slice([at(step), at(step + 1)]))).collect()
+        }
+    }
+}
+
+/// Points of the lower and the upper rim, in turn, of what an edge (radius, height) sweeps about z.
+fn slice(edge: [DVec2; 2]) -> Vec<DVec3> {
+    // The polygon's mean radius, not its corners', equals the circle's.
+    let angle = std::f64::consts::TAU / RIM as f64;
+    let reach = 1.0 + angle * angle / 24.0;
+    let point = |i: usize| {
+        let end = edge[i % 2];
+        (DVec2::from_angle(angle * (i / 2) as f64) * (end.x * reach)).extend(end.y)
+    };
+    (0..2 * RIM).map(point).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use acm_concept::camera::Intrinsics;
+    use glam::DQuat;
+    use proptest::prelude::*;
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(300))]
+        #[test]
+        fn outlines_cover_the_pixels_whose_rays_meet_the_solid(
+            kind in 0..5usize, turn in prop::array::uniform3(-3.0..3.0f64), column in 60.0..260.0f64, row in 20.0..220.0f64,
+        ) {
+            let corners = |points: &[(f64, f64)]| points.iter().map(|(r, z)| DVec2::new(*r, *z)).collect::<Vec<_>>();
+            // A spinning top: none of its slices alone covers it, nor is it convex.
+            let top = Solid::revolved(&corners(&[(0.0, 0.0), (0.03, 0.0), (0.01, 0.05), (0.06, 0.09), (0.0, 0.12)])).unwrap().0;
+            let solid = [
+                Solid::Box { size: DVec3::new(0.14, 0.08, 0.05) },
+                Solid::Cylinder { radius: 0.04, height: 0.1 },
+                Solid::Ellipsoid { size: DVec3::new(0.14, 0.09, 0.05) },
+                Solid::cone(0.06, 0.02, 0.12),
+                top,
+            ][kind];
+            let intrinsics = Intrinsics::from_vertical_fov(320, 240, 0.5);
+            let pose = Pose::new(DVec3::new(0.01, 0.02, 0.5), DQuat::from_scaled_axis(turn.into()));
+            let evidence = Evidence {
+                camera: Pose::IDENTITY, intrinsics, points: Vec::new(), point_weight: 1.0, outline: Vec::new(), outline_weight: 1.0,
             };
-            (0..2 * RIM).map(point).collect()
+            let placed = PlacedSolid { solid, pose };
+            let outlines = image_outlines(&placed, &Pose::IDENTITY, &evidence);
+            let pixel = DVec2::new(column, row);
+            let outside = outlines.iter().map(|o| distance_outside(o, pixel)).fold(f64::INFINITY, f64::min);
+            let meets = placed.intersect_ray(DVec3::ZERO, intrinsics.ray(column, row)).is_some();
+            // Polygons with 24 corners stand for circles.
+            prop_assert!(if meets { outside < 1.2 } else { outside > -1.2 }, "{solid:?}: {meets}, {outside} px outside");
         }
     }
 }

@@ -16,6 +16,7 @@ use rand_chacha::ChaCha8Rng;
 
 const BOX: &str = include_str!("../../../memory/library/box.toml");
 const CYLINDER: &str = include_str!("../../../memory/library/cylinder.toml");
+const CUP: &str = include_str!("../../../memory/library/tableware/cup.toml");
 
 /// A camera that looks at the origin, `pitch` below the horizon, from 0.8 m.
 fn camera(pitch: f64) -> Pose {
@@ -43,7 +44,13 @@ fn evidence(solid: &PlacedSolid, camera: Pose, sigma_m: f64) -> Evidence {
             if depth(column + dx, row + dy).is_none() {
                 let kind = if at.z < 0.012 { OutlineKind::Contact } else { OutlineKind::Own };
                 let pixel = DVec2::new(column as f64 + 0.5 * dx as f64, row as f64 + 0.5 * dy as f64);
-                outline.push(OutlinePoint { pixel, sigma_px: 1.5, kind, falls_off: kind == OutlineKind::Own, beyond: u32::MAX });
+                outline.push(OutlinePoint {
+                    pixel,
+                    sigma_px: 1.5,
+                    kind,
+                    falls_off: kind == OutlineKind::Own,
+                    beyond: u32::MAX,
+                });
             }
         }
     }
@@ -149,5 +156,23 @@ proptest! {
         prop_assert!(placed.pose.translation.distance(solid.pose.translation) < 0.004, "{placed:?}");
         let end = solid.pose.transform_point(DVec3::new(0.0, 0.0, -height / 2.0));
         prop_assert!(found.pose.translation.distance(end) < 0.006, "{} for {end}", found.pose.translation);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(8))]
+    #[test]
+    fn a_cup_is_recovered_from_a_rough_start(
+        bottom in 0.02..0.035f64, flare in 1.2..1.6f64, height in 0.06..0.12f64, off in -0.01..0.01f64,
+    ) {
+        let template = Template::parse("cup.toml", CUP).unwrap();
+        let truth = [bottom, bottom * flare, height];
+        let [solid] = template.solids(&template.named(&truth)).unwrap()[..] else { panic!("one solid") };
+        let evidence = evidence(&solid, camera(0.7), 0.002);
+        let rough = [bottom * 1.15, bottom * flare * 0.9, height * 1.1];
+        let (model, minimum) = fit(&template, &rough, DVec2::new(off, -off), 0.0, &evidence);
+        for (value, truth) in model.placement(&minimum.state).values.iter().zip(truth) {
+            prop_assert!((value - truth).abs() < 0.004, "{value} for {truth}");
+        }
     }
 }

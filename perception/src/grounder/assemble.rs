@@ -1,6 +1,7 @@
 //! From ranked hypotheses to a grounded object: calibrated uncertainty, canonical heading, appearance, confidence.
 
 use crate::{
+    config::GrounderConfig,
     fit::{Evidence, Profile, profile},
     hypotheses::{self, Context, Hypothesis},
     scene::Scene,
@@ -73,7 +74,8 @@ fn parts(
     let (model, minimum) = (&hypothesis.model, &hypothesis.minimum);
     let template = model.template;
     let placement = model.placement(&minimum.state);
-    let calibration = Calibration::new(scene, &scene.world.transform_point(placement.pose.translation));
+    let misfit_px = hypothesis.outline_misfit_px(evidence);
+    let calibration = Calibration::new(scene, &scene.world.transform_point(placement.pose.translation), misfit_px);
     let deviation = |index: usize| deviation(hypothesis, index);
     let (parameters, drift_m) = match hypothesis.tracked {
         // Nothing of its size was measured anew.
@@ -115,7 +117,7 @@ fn deviation(hypothesis: &Hypothesis, index: usize) -> f64 {
 fn measured_parameters(
     hypothesis: &Hypothesis,
     profile: &Profile,
-    calibration: &Calibration,
+    calibration: &Calibration<'_>,
 ) -> Vec<ParameterEstimate> {
     let (model, minimum) = (&hypothesis.model, &hypothesis.minimum);
     let values = model.placement(&minimum.state).values;
@@ -125,8 +127,8 @@ fn measured_parameters(
         let fitted = model.parameter_index(i).map_or(0.0, |index| deviation(hypothesis, index));
         let sigma = match (observability, spec.unit) {
             (Observability::PriorOnly, _) => spread(spec.min, spec.max),
-            (Observability::Interval { low, high }, _) => calibration.length(fitted).max(spread(low, high)),
-            (Observability::Observed, Unit::M) => calibration.length(fitted),
+            (Observability::Interval { low, high }, _) => calibration.size(fitted, values[i]).max(spread(low, high)),
+            (Observability::Observed, Unit::M) => calibration.size(fitted, values[i]),
             (Observability::Observed, _) => calibration.angle(fitted, 0.05),
         };
         ParameterEstimate { name: spec.name.clone(), value: values[i], sigma, observability }
@@ -168,26 +170,36 @@ fn world_pose(scene: &Scene, hypothesis: &Hypothesis, remembered: Option<&Ground
     Some(Pose::new(world.translation, DQuat::from_rotation_arc(DVec3::Z, normal) * upright))
 }
 
-/// Turns the standard deviations of a fit into honest ones: sigma^2 = (k sigma_fit)^2 + floor^2 + (share z)^2.
-struct Calibration {
-    factor: f64,
+/// Turns the standard deviations of a fit into honest ones. Places err with the camera's calibration:
+/// sigma^2 = (k sigma_fit)^2 + floor^2 + (share z)^2. Sizes do not, but things are not quite of their template's shape:
+/// sigma^2 = sigma_fit^2 + floor^2 + (share misfit)^2 + (share size)^2, where the misfit is that of the outline.
+struct Calibration<'a> {
+    config: &'a GrounderConfig,
     systematic_m: f64,
+    misfit_m: f64,
 }
 
-impl Calibration {
-    fn new(scene: &Scene, position: &DVec3) -> Calibration {
+impl Calibration<'_> {
+    fn new<'a>(scene: &Scene<'a>, position: &DVec3, misfit_px: f64) -> Calibration<'a> {
         let camera = (scene.world * scene.camera).inverse();
         let distance = camera.transform_point(*position).z.max(0.0);
         Calibration {
-            factor: scene.config.sigma_factor,
+            config: scene.config,
             systematic_m: scene.config.sigma_floor_m.hypot(scene.config.sigma_range * distance),
+            misfit_m: misfit_px * distance / scene.scan.intrinsics.fx,
         }
     }
+    fn size(&self, fitted: f64, value: f64) -> f64 {
+        let shape = (self.config.size_sigma_misfit * self.misfit_m).hypot(self.config.size_sigma_share * value);
+        fitted.hypot(shape).hypot(self.config.size_sigma_floor_m)
+    }
     fn length(&self, fitted: f64) -> f64 {
-        (self.factor * fitted).hypot(self.systematic_m)
+        (self.config.sigma_factor * fitted).hypot(self.systematic_m)
     }
     /// An angle over a lever of `reach_m`.
     fn angle(&self, fitted: f64, reach_m: f64) -> f64 {
-        (self.factor * fitted).hypot(0.5 * self.systematic_m / reach_m.max(0.005)).min(std::f64::consts::PI)
+        (self.config.sigma_factor * fitted)
+            .hypot(0.5 * self.systematic_m / reach_m.max(0.005))
+            .min(std::f64::consts::PI)
     }
 }

@@ -41,8 +41,8 @@ pub(super) fn complete(scene: &Scene, camera_pose: &Pose, library: &TemplateLibr
         let tolerance = AGREES_M + AGREES_SIGMAS * scene.noise_ratio * scene.config.depth_sigma_m(depth);
         measured <= 0.0 || (measured - depth).abs() < tolerance
     };
-    for at in 0..objects.len() {
-        let own = objects[at].support.indices();
+    for (at, object) in objects.iter_mut().enumerate() {
+        let own = object.support.indices();
         let mut mask = vec![false; scene.grid.len()];
         own.iter().for_each(|&pixel| mask[pixel] = true);
         let mut front = own;
@@ -55,7 +55,7 @@ pub(super) fn complete(scene: &Scene, camera_pose: &Pose, library: &TemplateLibr
             }
         }
         if let Some(support) = PixelSupport::from_mask(&mask, scene.grid.width) {
-            objects[at].support = support;
+            object.support = support;
         }
     }
 }

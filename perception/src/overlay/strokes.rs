@@ -76,21 +76,22 @@ pub(super) fn outline(strokes: &mut Strokes, owners: &labels::LabelImage, label:
 /// The edges of a solid.
 pub(super) fn wire_frame(strokes: &mut Strokes, percepts: &Percepts, solid: &PlacedSolid, color: Rgb<u8>) {
     let in_camera = PlacedSolid { solid: solid.solid, pose: percepts.frame.camera_pose.inverse() * solid.pose };
-    let corners = corners(&solid.solid);
-    let count = corners.len();
-    let edges: Vec<(usize, usize)> = match solid.solid {
-        Solid::Box { .. } => {
-            (0..8).flat_map(|i: usize| [1, 2, 4].map(|bit| (i, i | bit))).filter(|(a, b)| a != b).collect()
-        }
-        // Even corners are the lower rim, odd ones the upper; a few uprights join them.
-        Solid::Cylinder { .. } => {
-            (0..count).map(|i| (i, (i + 2) % count)).chain((0..count).step_by(12).map(|i| (i, i + 1))).collect()
-        }
-    };
     let mut walked = 0;
-    for (a, b) in edges {
-        let ends = [corners[a], corners[b]].map(|corner| in_camera.pose.transform_point(corner));
-        walked = line(strokes, percepts, &in_camera, ends, walked, color);
+    for corners in corners(&solid.solid) {
+        let count = corners.len();
+        let edges: Vec<(usize, usize)> = match solid.solid {
+            Solid::Box { .. } => {
+                (0..8).flat_map(|i: usize| [1, 2, 4].map(|bit| (i, i | bit))).filter(|(a, b)| a != b).collect()
+            }
+            // Even corners are the lower rim, odd ones the upper; a few uprights join them.
+            Solid::Cylinder { .. } | Solid::Ellipsoid { .. } | Solid::Revolved { .. } => {
+                (0..count).map(|i| (i, (i + 2) % count)).chain((0..count).step_by(12).map(|i| (i, i + 1))).collect()
+            }
+        };
+        for (a, b) in edges {
+            let ends = [corners[a], corners[b]].map(|corner| in_camera.pose.transform_point(corner));
+            walked = line(strokes, percepts, &in_camera, ends, walked, color);
+        }
     }
 }
 

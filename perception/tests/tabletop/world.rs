@@ -136,6 +136,10 @@ fn normal(solid: &Solid, at: DVec3) -> DVec3 {
                 at.with_z(0.0).normalize()
             }
         }
+        Solid::Ellipsoid { .. } | Solid::Revolved { .. } => {
+            let along = |axis: DVec3| solid.signed_distance(at + axis * 1e-6) - solid.signed_distance(at - axis * 1e-6);
+            DVec3::new(along(DVec3::X), along(DVec3::Y), along(DVec3::Z)).normalize_or_zero()
+        }
     }
 }
 

@@ -6,7 +6,7 @@
 use acm_concept::{
     camera::{CameraModel, Intrinsics},
     pose::Pose,
-    solid::{PlacedSolid, Solid},
+    solid::{Enclosure, PlacedSolid, Solid},
 };
 use acm_render::{
     Instance, Lighting, Material, Mesh, Pattern, PatternKind, PointLight, RenderError, Rendered, Renderer, Scene, Sun,
@@ -71,9 +71,9 @@ fn cast(solids: &[(PlacedSolid, u32)], camera: &CameraModel, column: f64, row: f
 /// Renders solids and compares every pixel that is not within a twentieth of a pixel of a silhouette.
 fn compare(solids: &[(PlacedSolid, u32)], camera: &CameraModel, tolerance_m: f64) {
     let draw = |(placed, id): &(PlacedSolid, u32)| {
-        let (mesh, scale) = match placed.solid {
-            Solid::Box { size } => (Mesh::unit_box(), size),
-            Solid::Cylinder { radius, height } => (Mesh::unit_cylinder(), DVec3::new(radius, radius, height)),
+        let (mesh, scale) = match placed.solid.enclosure() {
+            Enclosure::Box { size } => (Mesh::unit_box(), size),
+            Enclosure::Cylinder { radius, height } => (Mesh::unit_cylinder(), DVec3::new(radius, radius, height)),
         };
         instance(mesh, placed.pose, scale, [200; 3], *id)
     };

@@ -3,7 +3,7 @@
 use crate::convert::vector;
 use acm_concept::{
     pose::Pose,
-    solid::{PlacedSolid, Solid},
+    solid::{Enclosure, PlacedSolid, Solid},
 };
 use acm_render::Mesh;
 use glam::{DQuat, DVec3, Vec3};
@@ -57,10 +57,12 @@ impl Shape {
         }
         let across = (scale.x * scale.y).sqrt();
         match self {
-            Shape::Solid(Solid::Box { size }) => Shape::Solid(Solid::Box { size: *size * scale }),
-            Shape::Solid(Solid::Cylinder { radius, height }) => {
-                Shape::Solid(Solid::Cylinder { radius: radius * across, height: height * scale.z })
-            }
+            Shape::Solid(solid) => Shape::Solid(match solid.enclosure() {
+                Enclosure::Box { size } => Solid::Box { size: size * scale },
+                Enclosure::Cylinder { radius, height } => {
+                    Solid::Cylinder { radius: radius * across, height: height * scale.z }
+                }
+            }),
             Shape::Capsule { radius, height } => Shape::Capsule { radius: radius * across, height: height * scale.z },
             Shape::Ball { radius } => Shape::Ball { radius: radius * scale.element_product().cbrt() },
             Shape::Hull(hull) => {
@@ -123,8 +125,8 @@ pub(crate) fn bounds(points: impl Iterator<Item = DVec3>) -> (DVec3, DVec3) {
 
 /// The collision shape of a solid, and the shape's own frame in the solid's: the engine's cylinders stand along y.
 pub(crate) fn shape(solid: &Solid, bevel_m: f64) -> (Pose, SharedShape) {
-    match *solid {
-        Solid::Box { size } => {
+    match solid.enclosure() {
+        Enclosure::Box { size } => {
             let half = (size * 0.5 - DVec3::splat(bevel_m)).as_vec3();
             let shape = if bevel_m > 0.0 {
                 SharedShape::round_cuboid(half.x, half.y, half.z, bevel_m as f32)
@@ -133,7 +135,7 @@ pub(crate) fn shape(solid: &Solid, bevel_m: f64) -> (Pose, SharedShape) {
             };
             (Pose::IDENTITY, shape)
         }
-        Solid::Cylinder { radius, height } => {
+        Enclosure::Cylinder { radius, height } => {
             let z_up = Pose::new(DVec3::ZERO, DQuat::from_rotation_x(std::f64::consts::FRAC_PI_2));
             (z_up, SharedShape::cylinder((height * 0.5) as f32, radius as f32))
         }

@@ -4,7 +4,7 @@ use acm_concept::{
     arm::{ArmDescription, Joints},
     embodiment::RobotDescription,
     pose::Pose,
-    solid::{PlacedSolid, Solid},
+    solid::{Enclosure, PlacedSolid, Solid},
 };
 use glam::{DQuat, DVec3};
 use parry3d::{
@@ -134,13 +134,14 @@ fn nearer(
     contact.map_or(nearest, |contact| contact.dist.min(nearest))
 }
 
+/// Of a solid that is neither, the box or cylinder round it is kept clear of.
 fn placed(part: &PlacedSolid) -> (engine::Pose, SharedShape) {
-    match part.solid {
-        Solid::Box { size } => {
+    match part.solid.enclosure() {
+        Enclosure::Box { size } => {
             let half = (0.5 * size).as_vec3();
             (to_engine(&part.pose), SharedShape::cuboid(half.x, half.y, half.z))
         }
-        Solid::Cylinder { radius, height } => {
+        Enclosure::Cylinder { radius, height } => {
             // The library's cylinders stand along y.
             let z_up = Pose::new(DVec3::ZERO, DQuat::from_rotation_x(FRAC_PI_2));
             (to_engine(&(part.pose * z_up)), SharedShape::cylinder((0.5 * height) as f32, radius as f32))

@@ -3,10 +3,13 @@
 use super::plan::{PerturbationPlan, Range};
 use acm_concept::solid::Solid;
 use acm_render::{Mesh, MeshError};
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
-use std::{collections::BTreeMap, f64::consts::TAU};
+use std::{
+    collections::BTreeMap,
+    f64::consts::{PI, TAU},
+};
 
 /// Lines of the grid over a surface are this near to each other, metres.
 const GRID_M: f64 = 0.004;
@@ -16,7 +19,7 @@ const SEGMENTS: u32 = 48;
 const SAME_SIDE: f64 = 0.5;
 
 /// How a solid differs from its exact shape. Metres; 0 for none.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Deviation {
     bevel_m: f64,
     draft_m: f64,
@@ -61,6 +64,13 @@ impl Deviation {
         let (points, triangles) = match *solid {
             Solid::Box { size } => boxed(size, own.bevel_m),
             Solid::Cylinder { radius, height } => round(radius, height, own.bevel_m),
+            Solid::Revolved { profile } => swept(profile.corners()),
+            Solid::Ellipsoid { size } => {
+                let half_circle = |step: u32| DVec2::from_angle(PI * (f64::from(step) / f64::from(SEGMENTS / 2) - 0.5));
+                let ball: Vec<DVec2> = (0..=SEGMENTS / 2).map(|step| 0.5 * half_circle(step)).collect();
+                let (points, triangles) = swept(&ball);
+                (points.into_iter().map(|point| point * size).collect(), triangles)
+            }
         };
         let moved: Vec<glam::Vec3> = points.iter().map(|point| own.moved(solid, *point).as_vec3()).collect();
         Mesh::from_triangles("perturbed solid", &moved, &triangles)
@@ -96,6 +106,8 @@ impl Deviation {
                 let plan = point.truncate();
                 (plan * (across / plan.length().max(1e-12)).min(1.0)).extend(point.z.clamp(-tall, tall))
             }
+            // Round already, or as sharp as its profile says.
+            Solid::Ellipsoid { .. } | Solid::Revolved { .. } => return point,
         };
         inner + (point - inner).normalize_or_zero() * self.bevel_m
     }
@@ -177,6 +189,28 @@ fn round(radius: f64, height: f64, bevel_m: f64) -> (Vec<DVec3>, Vec<[u32; 3]>) 
     (points, triangles)
 }
 
+/// The surface that a closed profile (radius, height), counter-clockwise, sweeps about z. Corners on the axis are one point.
+fn swept(profile: &[DVec2]) -> (Vec<DVec3>, Vec<[u32; 3]>) {
+    let (mut points, mut rings) = (Vec::new(), Vec::new());
+    for corner in profile {
+        let steps = if corner.x > 1e-9 { SEGMENTS } else { 1 };
+        rings.push((points.len() as u32, steps));
+        points.extend((0..steps).map(|step| {
+            let turn = DVec2::from_angle(f64::from(step) / f64::from(SEGMENTS) * TAU);
+            (turn * corner.x).extend(corner.y)
+        }));
+    }
+    let at = |(first, steps): (u32, u32), step: u32| first + step % steps;
+    let mut triangles = Vec::new();
+    for (low, high) in rings.iter().zip(rings.iter().cycle().skip(1)) {
+        for step in 0..SEGMENTS {
+            let [a, b, c, d] = [at(*low, step), at(*low, step + 1), at(*high, step), at(*high, step + 1)];
+            triangles.extend([[a, b, d], [a, d, c]].into_iter().filter(|[p, q, r]| p != q && q != r && r != p));
+        }
+    }
+    (points, triangles)
+}
+
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)] // a failed step is a failed test
@@ -187,6 +221,14 @@ mod tests {
         let dent = Dent { direction: DVec3::new(1.0, 0.2, 0.1), depth_m: 0.006, radius_m: 0.02 };
         let deviation = Deviation { bevel_m: 0.004, draft_m: 0.008, dent: Some(dent) };
         let solids = [Solid::Box { size: DVec3::new(0.12, 0.08, 0.05) }, Solid::Cylinder { radius: 0.04, height: 0.1 }];
+        let corners = [(0.0, 0.0), (0.04, 0.0), (0.05, 0.1), (0.046, 0.1), (0.036, 0.004), (0.0, 0.004)];
+        let corners = corners.map(|(radius, height)| DVec2::new(radius, height));
+        for solid in [Solid::Ellipsoid { size: DVec3::new(0.1, 0.08, 0.05) }, Solid::revolved(&corners).unwrap().0] {
+            let mesh = Deviation::default().mesh(&solid, 0.25).unwrap();
+            assert!(mesh.is_closed(), "{solid:?}");
+            let far = |point: &glam::Vec3| solid.signed_distance(point.as_dvec3()).abs();
+            assert!(mesh.positions().iter().all(|point| far(point) < 1e-6), "{solid:?}");
+        }
         for solid in solids {
             let mesh = deviation.mesh(&solid, 0.25).unwrap();
             assert!(mesh.is_closed(), "{solid:?}");

@@ -196,6 +196,7 @@ impl<'a> Workshop<'a> {
             }
             (None, Solid::Box { size }) => (self.cuboid.clone(), size),
             (None, Solid::Cylinder { radius, height }) => (self.cylinder.clone(), DVec3::new(radius, radius, height)),
+            (None, solid) => (Arc::new(Deviation::default().mesh(&solid, 0.0)?), DVec3::ONE),
         };
         Ok(Piece { mesh, scale, pose: placed.pose, material })
     }

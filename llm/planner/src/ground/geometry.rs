@@ -2,7 +2,7 @@
 
 use acm_concept::{
     pose::Pose,
-    solid::{PlacedSolid, Solid},
+    solid::{Enclosure, PlacedSolid},
     template::YawSymmetry,
 };
 use acm_memory::{MemoryView, entry::ObjectEntry};
@@ -75,10 +75,7 @@ pub(crate) fn top_centre(view: &dyn MemoryView, entry: &ObjectEntry) -> Option<P
 
 /// Volume of an object's solids, cubic metres.
 pub(crate) fn volume(view: &dyn MemoryView, entry: &ObjectEntry) -> f64 {
-    let volume_of = |placed: &PlacedSolid| match placed.solid {
-        Solid::Box { size } => size.x * size.y * size.z,
-        Solid::Cylinder { radius, height } => std::f64::consts::PI * radius * radius * height,
-    };
+    let volume_of = |placed: &PlacedSolid| placed.solid.volume();
     entry.pose().map_or(0.0, |pose| solids_at(view, entry, &pose).iter().map(volume_of).sum())
 }
 
@@ -91,8 +88,8 @@ pub(crate) fn symmetry(view: &dyn MemoryView, entry: &ObjectEntry) -> YawSymmetr
 
 fn outline(placed: &PlacedSolid) -> Vec<DVec2> {
     let flat = |point: DVec3| placed.pose.transform_point(point).truncate();
-    match placed.solid {
-        Solid::Box { size } => {
+    match placed.solid.enclosure() {
+        Enclosure::Box { size } => {
             let half = size * 0.5;
             // A box tilted about its y axis is seen from above as long as the shadow of both its length and height.
             let shadow = |axis: DVec3, half: f64| placed.pose.transform_vector(axis).truncate() * half;
@@ -102,7 +99,7 @@ fn outline(placed: &PlacedSolid) -> Vec<DVec2> {
                 .map(|(x, y)| flat(DVec3::new(x * half.x * reach, y * half.y, 0.0)))
                 .to_vec()
         }
-        Solid::Cylinder { radius, .. } => (0..CIRCLE_CORNERS)
+        Enclosure::Cylinder { radius, .. } => (0..CIRCLE_CORNERS)
             .map(|corner| {
                 let angle = f64::from(corner) * std::f64::consts::TAU / f64::from(CIRCLE_CORNERS);
                 flat(DVec3::new(radius * angle.cos(), radius * angle.sin(), 0.0))
@@ -137,6 +134,7 @@ fn separation(a: &[DVec2], b: &[DVec2]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use acm_concept::solid::Solid;
     use proptest::prelude::*;
 
     fn square(x: f64, y: f64, half: f64, yaw: f64) -> Vec<DVec2> {

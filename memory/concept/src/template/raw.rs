@@ -1,6 +1,6 @@
 //! The text of a template file, before its meaning is checked.
 
-use super::*;
+use super::{shape::RawSolid, *};
 use crate::expression::Expression;
 use serde::Deserialize;
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -12,6 +12,8 @@ struct RawTemplate {
     seen_by: SeenBy,
     #[serde(default = "one")]
     prior: f64,
+    #[serde(default = "yes")]
+    stands_alone: bool,
     #[serde(default)]
     affordances: Vec<String>,
     synopsis: RawSynopsis,
@@ -68,20 +70,16 @@ struct RawPart {
     #[serde(default = "origin")]
     position: [String; 3],
     #[serde(default = "zero")]
+    yaw: String,
+    #[serde(default = "zero")]
     tilt: String,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields, tag = "shape", rename_all = "kebab-case")]
-enum RawSolid {
-    Box { size: [String; 3], position: [String; 3], part: Option<String> },
-    Cylinder { radius: String, height: String, position: [String; 3], part: Option<String> },
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawFrame {
     name: String,
+    part: Option<String>,
     position: [String; 3],
     #[serde(default = "zero")]
     yaw: String,
@@ -176,6 +174,9 @@ struct RawFunction {
     effects: Vec<String>,
 }
 
+fn yes() -> bool {
+    true
+}
 fn one() -> f64 {
     1.0
 }
@@ -230,7 +231,7 @@ impl Meaning<'_> {
         // First, so that a bad parameter is named itself and not by the expressions that use it.
         let parameters = raw.parameter.iter().map(|p| self.parameter(p)).collect::<Result<_, _>>()?;
         let parts = self.parts(raw)?;
-        let frames = raw.frame.iter().map(|f| self.frame(f)).collect::<Result<Vec<_>, _>>()?;
+        let frames = raw.frame.iter().map(|f| self.frame(f, &parts)).collect::<Result<Vec<_>, _>>()?;
         let symmetry = raw.symmetry.iter().map(|rule| {
             let when = rule.when.as_deref().map(|text| self.expression("symmetry", text)).transpose()?;
             Ok(SymmetryRule { fold: rule.fold, when })
@@ -240,6 +241,7 @@ impl Meaning<'_> {
             synopsis: self.synopsis(&raw.synopsis)?,
             seen_by: raw.seen_by,
             prior: raw.prior,
+            stands_alone: raw.stands_alone,
             parameters,
             constraints: self.expressions("constraints", &raw.constraints)?,
             solids: raw.solid.iter().map(|s| self.solid(s, &parts)).collect::<Result<_, _>>()?,
@@ -301,7 +303,8 @@ impl Meaning<'_> {
 
     /// The parts that the file names; the template's own affordances are those of the main one.
     fn parts(&self, raw: &RawTemplate) -> Result<Vec<PartSpec>, TemplateError> {
-        let whole = RawPart { name: WHOLE.into(), affordances: Vec::new(), position: origin(), tilt: zero() };
+        let whole =
+            RawPart { name: WHOLE.into(), affordances: Vec::new(), position: origin(), yaw: zero(), tilt: zero() };
         let named: Vec<&RawPart> =
             if raw.part.is_empty() { vec![&whole] } else { raw.part.iter().take(MAX_PARTS + 1).collect() };
         if named.len() > MAX_PARTS {
@@ -319,6 +322,7 @@ impl Meaning<'_> {
                 name: raw_part.name.clone(),
                 affordances: own.iter().chain(&raw_part.affordances).cloned().collect(),
                 position: self.triple(&place, &raw_part.position)?,
+                yaw: self.expression(&place, &raw_part.yaw)?,
                 tilt: self.expression(&place, &raw_part.tilt)?,
             })
         };
@@ -326,29 +330,29 @@ impl Meaning<'_> {
     }
 
     fn solid(&self, raw: &RawSolid, parts: &[PartSpec]) -> Result<SolidSpec, TemplateError> {
-        let (shape, position, part) = match raw {
-            RawSolid::Box { size, position, part } => {
-                (ShapeSpec::Box { size: self.triple("solid", size)? }, position, part)
-            }
-            RawSolid::Cylinder { radius, height, position, part } => {
-                let (radius, height) = (self.expression("solid", radius)?, self.expression("solid", height)?);
-                (ShapeSpec::Cylinder { radius, height }, position, part)
-            }
-        };
-        let named = |name: &String| parts.iter().position(|part| part.name == *name);
-        let part = part.as_ref().map_or(Some(0), named).ok_or_else(|| TemplateError::UnknownPart {
-            file: self.file.into(),
-            part: part.clone().unwrap_or_default(),
-            known: parts.iter().map(|part| part.name.as_str()).collect::<Vec<_>>().join(", "),
-        })?;
-        Ok(SolidSpec { part, shape, position: self.triple("solid", position)? })
+        let part = self.part("a solid", &raw.part, parts)?.unwrap_or(0);
+        let format = |reason: String| TemplateError::Format { file: self.file.into(), reason };
+        SolidSpec::read(raw, part, format, |text| self.expression("solid", text))
     }
 
-    fn frame(&self, raw: &RawFrame) -> Result<FrameSpec, TemplateError> {
+    /// The index of a part that a solid or frame names.
+    fn part(&self, what: &str, name: &Option<String>, parts: &[PartSpec]) -> Result<Option<usize>, TemplateError> {
+        let Some(name) = name else { return Ok(None) };
+        let place = parts.iter().position(|part| part.name == *name);
+        place.map(Some).ok_or_else(|| TemplateError::UnknownPart {
+            file: self.file.into(),
+            what: what.into(),
+            part: name.clone(),
+            known: parts.iter().map(|part| part.name.as_str()).collect::<Vec<_>>().join(", "),
+        })
+    }
+
+    fn frame(&self, raw: &RawFrame, parts: &[PartSpec]) -> Result<FrameSpec, TemplateError> {
         let place = format!("frame `{}`", raw.name);
+        let part = self.part(&place, &raw.part, parts)?;
         let (position, yaw) = (self.triple(&place, &raw.position)?, self.expression(&place, &raw.yaw)?);
         let (out, turn) = (raw.out.rotation(), self.expression(&place, &raw.turn)?);
-        Ok(FrameSpec { name: raw.name.clone(), position, yaw, out, turn })
+        Ok(FrameSpec { name: raw.name.clone(), part, position, yaw, out, turn })
     }
 
     fn rest(&self, raw: &RawRest) -> Result<Rest, TemplateError> {

@@ -1,4 +1,5 @@
 use super::*;
+use crate::solid::Solid;
 use glam::{DQuat, DVec3};
 
 const PUCK: &str = r#"
@@ -168,6 +169,11 @@ fn parts_move_with_the_parameters() {
     assert!(case.part_solids("lid", &values).unwrap().is_empty());
     assert_eq!(case.parts[0].affordances, ["supportive"], "the template's own affordances are the main part's");
     assert_eq!(case.affordances().collect::<Vec<_>>(), ["supportive", "openable"]);
+    // A frame may move with a part.
+    let edge = "[[frame]]\nname = \"edge\"\npart = \"flap\"\nposition = [\"length\", \"0\", \"0\"]\nout = \"x\"\n";
+    let with_edge = Template::parse("case.toml", &format!("{CASE}{edge}")).unwrap();
+    let edge = with_edge.frame("edge", &values).unwrap().unwrap();
+    assert!(edge.translation.distance(tip) < 1e-12 && edge.transform_vector(DVec3::Z).distance(DVec3::Z) < 1e-12);
     let error = |from: &str, to: &str| Template::parse("case.toml", &CASE.replace(from, to)).unwrap_err().to_string();
     assert!(error("part = \"flap\"", "part = \"flip\"").contains("`flip`, which is not among: body, flap"));
     assert!(error("name = \"flap\"", "name = \"body\"").contains("`body` is declared twice"));
@@ -186,4 +192,57 @@ fn the_common_symmetry_holds_at_all_values() {
     assert_eq!(fold(&(rule(0, flat) + &rule(3, ""))), YawSymmetry::Fold(3));
     assert_eq!(fold(&rule(4, flat)), YawSymmetry::Fold(1));
     assert_eq!(fold(""), YawSymmetry::Fold(1));
+}
+
+#[test]
+fn solids_may_be_hollow_lie_and_be_turned() {
+    let solids = |solid: &str| {
+        let text = PUCK.replace("shape = \"cylinder\"\nradius = \"radius\"\nheight = \"height\"", solid);
+        let puck = Template::parse("puck.toml", &text).map_err(|e| e.to_string())?;
+        puck.solids(&[("radius", 0.05), ("height", 0.04)]).map_err(|e| e.to_string())
+    };
+    let distance = |solid: &str, at: [f64; 3]| {
+        solids(solid).unwrap().iter().map(|s| s.signed_distance(at.into())).fold(f64::INFINITY, f64::min)
+    };
+    // A cup: 4 mm of floor, and nothing above its middle.
+    let cup = "shape = \"cone\"\nradius_bottom = \"radius - 0.01\"\nradius_top = \"radius\"\nheight = \"height\"\nwall = \"0.004\"";
+    assert!((distance(cup, [0.0, 0.0, 0.014]) - 0.01).abs() < 1e-12);
+    assert!(distance(cup, [0.0475, 0.0, 0.039]) < 0.0);
+    // A box without a lid is its floor and four walls.
+    let tray = "shape = \"box\"\nsize = [\"0.2\", \"0.1\", \"height\"]\nwall = \"0.004\"";
+    assert_eq!(solids(tray).unwrap().len(), 5);
+    assert!((distance(tray, [0.0, 0.0, 0.024]) - 0.02).abs() < 1e-12);
+    assert!(distance(tray, [0.099, 0.0, 0.03]) < 0.0 && distance(tray, [0.0, 0.099, 0.03]) > 0.04);
+    // A rod along y, and one along x that is turned by a right angle: the same.
+    let rod = "shape = \"cylinder\"\nradius = \"0.01\"\nheight = \"0.2\"\naxis = ";
+    for rod in [format!("{rod}\"y\""), format!("{rod}\"x\"\nyaw = \"PI / 2\"")] {
+        assert!((distance(&rod, [0.0, 0.11, 0.02]) - 0.01).abs() < 1e-9, "{rod}");
+    }
+    // A profile says itself how high it is.
+    let ring = "shape = \"revolved\"\nprofile = [[\"radius / 2\", \"0\"], [\"radius\", \"0\"], [\"radius\", \"height\"], [\"radius / 2\", \"height\"]]";
+    assert!((distance(ring, [0.0, 0.0, 0.04]) - 0.025).abs() < 1e-12);
+    let egg = "shape = \"ellipsoid\"\nsize = [\"0.06\", \"0.04\", \"height\"]";
+    assert!(distance(egg, [0.03, 0.0, 0.02]).abs() < 1e-9);
+    assert!(
+        solids("shape = \"cone\"\nradius_top = \"radius\"\nheight = \"height\"")
+            .unwrap_err()
+            .contains("needs `radius_bottom`")
+    );
+    assert!(solids("shape = \"ellipsoid\"\nradius = \"radius\"").unwrap_err().contains("`ellipsoid` has no `radius`"));
+    assert!(solids("shape = \"revolved\"\nprofile = [[\"0\", \"0\"]]").unwrap_err().contains("not 1"));
+}
+
+#[test]
+fn typical_values_are_the_middle_unless_a_constraint_forbids_it() {
+    let typical = |constraints: &str| {
+        let text = PUCK.replace("constraints = [\"height < 2 * radius\"]", &format!("constraints = [{constraints}]"));
+        Template::parse("puck.toml", &text).unwrap().typical()
+    };
+    let middle = [(0.01f64 * 0.1).sqrt(), (0.005f64 * 0.05).sqrt()];
+    let near = |a: Option<Vec<f64>>, b: [f64; 2]| a.unwrap().iter().zip(b).all(|(a, b)| (a / b - 1.0).abs() < 0.02);
+    assert!(near(typical(""), middle));
+    // The nearest to the middle on the line where both are equal.
+    let both = (middle[0] * middle[1]).sqrt();
+    assert!(near(typical("\"height > radius\""), [both, both]));
+    assert_eq!(typical("\"height > radius\", \"radius > 2 * height\""), None);
 }
