@@ -2,11 +2,12 @@
 cargo := scripts/cargo_with_progress.py
 target := $(or $(CARGO_TARGET_DIR),target)
 
-.PHONY: help setup demo test
+.PHONY: help setup demo test test-learned
 
 help:
 	@echo 'make demo   set up, build, and tell the first minute: one task with memory, then without; writes out/demo/index.html'
 	@echo 'make test   set up, build, and run all tests'
+	@echo 'make test-learned   the same of the learned estimator, which is off by default'
 
 setup:
 	@scripts/setup.sh
@@ -19,3 +20,8 @@ demo: setup
 test: setup
 	@$(cargo) test --workspace --locked --no-run
 	@cargo test --workspace --locked
+
+# Apart from the others: what the learned estimator stands on takes minutes to build.
+test-learned: setup
+	@cargo test --locked -p acm-learned --features candle
+	@cargo test --locked -p acm --features learned --lib learn

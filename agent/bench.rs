@@ -168,14 +168,14 @@ fn finish(args: &BenchArgs, targets: &Targets, result: &BenchResult) -> anyhow::
     Ok(if !result.errors.is_empty() || result.figures.iter().any(misses) { Exit::Failed } else { Exit::Success })
 }
 
-fn write_json(path: &Path, result: &BenchResult) -> anyhow::Result<()> {
+pub(crate) fn write_json(path: &Path, result: &BenchResult) -> anyhow::Result<()> {
     let mut text = serde_json::to_string_pretty(result)?;
     text.push('\n');
     std::fs::write(path, text).with_context(|| format!("the result {} cannot be written", path.display()))
 }
 
 /// A bar on standard error that says how far a part has come.
-fn progress(what: &str, length: u64) -> ProgressBar {
+pub(crate) fn progress(what: &str, length: u64) -> ProgressBar {
     let bar = ProgressBar::new(length);
     let style = ProgressStyle::with_template(&format!("{what} {{bar:30}} {{pos}}/{{len}} {{elapsed}} eta {{eta}}"));
     match style {

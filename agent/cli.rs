@@ -1,5 +1,7 @@
 //! The command line and its exit codes.
 
+#[cfg(feature = "learned")]
+pub mod learn;
 pub mod trace;
 
 use crate::{
@@ -87,6 +89,10 @@ pub enum Command {
     /// Measure figures and print them beside what they are to reach.
     #[command(subcommand)]
     Bench(BenchCommand),
+    /// Train the learned estimator of template parameters, and compare it with the geometric one.
+    #[cfg(feature = "learned")]
+    #[command(subcommand)]
+    Learn(learn::LearnCommand),
     /// The other process of a bench: takes frames and says when.
     #[command(hide = true)]
     BenchReader(BenchReaderArgs),
@@ -460,6 +466,8 @@ pub fn run(cli: Cli) -> anyhow::Result<Exit> {
         Command::Sim(SimCommand::Serve(args)) => serve::run(&args),
         Command::Trace(command) => crate::trace::run(&command),
         Command::Bench(command) => bench::run(&command),
+        #[cfg(feature = "learned")]
+        Command::Learn(command) => crate::learn::run(&command),
         Command::BenchReader(args) => bench::runtime::peer::run(&args),
         Command::Doctor => doctor::run(),
     }

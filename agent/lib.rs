@@ -15,6 +15,7 @@
 //! | [`demo`] | `acm demo`: the first minute |
 //! | [`perceive`] | `acm perceive`: real frames, no simulator |
 //! | [`mod@bench`] | `acm bench`: figures beside what they are to reach |
+//! | `learn` | `acm learn`: the learned estimator (feature `learned`) |
 //! | [`tools`] | the tools of perception that a user names, opened |
 //! | [`scenario`], [`library`], [`doctor`] | `acm scenario`, `acm library`, `acm doctor` |
 //! | [`trace`] | `acm trace`: a run written down, and looked into |
@@ -31,6 +32,8 @@ pub mod doctor;
 pub mod embed;
 pub mod episode;
 pub mod inject;
+#[cfg(feature = "learned")]
+pub mod learn;
 pub mod library;
 pub mod live;
 pub mod llm;

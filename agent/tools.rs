@@ -6,25 +6,29 @@ use std::sync::Arc;
 
 /// What stands before the path of a model file.
 const ONNX: &str = "onnx:";
+/// What stands before the path of a folder of weights.
+const LEARNED: &str = "learned:";
 
-/// Opens what the `[tools]` table of `file` names: `http://HOST:PORT`, or `onnx:MODEL.onnx` for a segmenter or a parameter
-/// estimator. Servers are not asked yet.
+/// Opens what the `[tools]` table of `file` names: `http://HOST:PORT`, `onnx:MODEL.onnx` for a segmenter or a parameter
+/// estimator, or `learned:DIR` for a parameter estimator. Servers are not asked yet.
 ///
 /// # Errors
-/// An address that is none, a model that cannot be opened, or one in a build without ONNX.
+/// An address that is none, a model that cannot be opened, or one that this build leaves out.
 pub fn open(file: &str, settings: &ToolSettings) -> anyhow::Result<Tools> {
     let at = |field: &'static str| move |reason: String| anyhow::anyhow!("{file}: tools.{field}: {reason}");
     let http = |field: &'static str, named: &Option<String>| {
         let tool = named.as_deref().map(HttpTool::new).transpose().map_err(at(field))?;
         anyhow::Ok(tool.map(Arc::new))
     };
-    let segmenter: Option<Arc<dyn Segmenter>> = match model(&settings.segmenter) {
+    let segmenter: Option<Arc<dyn Segmenter>> = match path(&settings.segmenter, ONNX) {
         Some(path) => Some(onnx::segmenter(path).map_err(at("segmenter"))?),
         None => http("segmenter", &settings.segmenter)?.map(|tool| tool as _),
     };
-    let param_estimator = match model(&settings.param_estimator) {
-        Some(path) => Some(onnx::param_estimator(path).map_err(at("param_estimator"))?),
-        None => http("param_estimator", &settings.param_estimator)?.map(|tool| tool as _),
+    let named = &settings.param_estimator;
+    let param_estimator = match (path(named, ONNX), path(named, LEARNED)) {
+        (Some(path), _) => Some(onnx::param_estimator(path).map_err(at("param_estimator"))?),
+        (None, Some(path)) => Some(learned::param_estimator(path).map_err(at("param_estimator"))?),
+        (None, None) => http("param_estimator", named)?.map(|tool| tool as _),
     };
     Ok(Tools {
         detector: http("detector", &settings.detector)?.map(|tool| tool as _),
@@ -37,8 +41,30 @@ pub fn open(file: &str, settings: &ToolSettings) -> anyhow::Result<Tools> {
     })
 }
 
-fn model(named: &Option<String>) -> Option<&str> {
-    named.as_deref()?.strip_prefix(ONNX)
+fn path<'a>(named: &'a Option<String>, kind: &str) -> Option<&'a str> {
+    named.as_deref()?.strip_prefix(kind)
+}
+
+#[cfg(feature = "learned")]
+mod learned {
+    use acm_learned::tool::LearnedTool;
+    use acm_perception::{GrounderConfig, tools::ParamEstimator};
+    use std::{path::Path, sync::Arc};
+
+    pub fn param_estimator(path: &str) -> Result<Arc<dyn ParamEstimator>, String> {
+        let tool = LearnedTool::read(Path::new(path), GrounderConfig::default());
+        tool.map(|tool| Arc::new(tool) as _).map_err(|error| error.to_string())
+    }
+}
+
+#[cfg(not(feature = "learned"))]
+mod learned {
+    use acm_perception::tools::ParamEstimator;
+    use std::sync::Arc;
+
+    pub fn param_estimator(path: &str) -> Result<Arc<dyn ParamEstimator>, String> {
+        Err(format!("{path} needs the learned estimator, which this build leaves out: build with --features learned"))
+    }
 }
 
 #[cfg(feature = "onnx")]

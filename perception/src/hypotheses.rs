@@ -2,6 +2,7 @@
 //! template's prior and the words of the instruction.
 
 pub(crate) mod advised;
+pub(crate) mod given;
 mod tipped;
 
 use crate::{

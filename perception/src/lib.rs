@@ -12,6 +12,7 @@
 //! | `scan`, `support`, `scene`, `own` | pixels to points, the plane and its extent, heights, the robot's own pixels |
 //! | `segments`, `joins`, `patches` | what stands on the plane, what lies in it |
 //! | `measure`, `fit`, `hypotheses` | first guesses, template fits, the choice among templates |
+//! | [`given`] | first guess and fit of things whose pixels are given |
 //! | `expected`, `raster` | the comparison with memory's expectation, ray-cast |
 //! | [`tools`] | tools that help: traits, the geometric default, what every implementation must pass |
 //! | [`overlay`], [`labels`], [`metrics`] | pictures for a person, label images, segmentation scores |
@@ -20,6 +21,7 @@
 
 pub mod config;
 pub mod frames;
+pub mod given;
 pub mod grounder;
 pub mod labels;
 pub mod level;

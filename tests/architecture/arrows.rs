@@ -6,12 +6,13 @@ use cargo_metadata::{DependencyKind, Metadata};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Each of our crates with those of ours that it may name. A crate that is missing here may not exist.
-const MAY_NAME: [(&str, &[&str]); 13] = [
+const MAY_NAME: [(&str, &[&str]); 14] = [
     ("acm-concept", &[]),
     ("acm-llm", &[]),
     ("acm-runtime", &[]),
     ("acm-memory", &["acm-concept"]),
     ("acm-perception", &["acm-concept"]),
+    ("acm-learned", &["acm-concept", "acm-perception"]),
     ("acm-onnx", &["acm-concept", "acm-perception"]),
     ("acm-skills", &["acm-concept"]),
     ("acm-render", &["acm-concept"]),
@@ -28,6 +29,7 @@ const MAY_NAME: [(&str, &[&str]); 13] = [
             "acm-actors",
             "acm-baselines",
             "acm-concept",
+            "acm-learned",
             "acm-llm",
             "acm-memory",
             "acm-onnx",
@@ -42,13 +44,20 @@ const MAY_NAME: [(&str, &[&str]); 13] = [
 ];
 
 /// Outside crates that belong to one of ours alone.
-const RESERVED: [(&str, &str); 3] = [("ort", "acm-onnx"), ("rapier3d", "acm-sim"), ("wgpu", "acm-render")];
+const RESERVED: [(&str, &str); 5] = [
+    ("candle-core", "acm-learned"),
+    ("candle-nn", "acm-learned"),
+    ("ort", "acm-onnx"),
+    ("rapier3d", "acm-sim"),
+    ("wgpu", "acm-render"),
+];
 
 /// The agent's side: it sees frames and what an arm reports, and cannot name a simulator type.
-const AGENT_SIDE: [&str; 10] = [
+const AGENT_SIDE: [&str; 11] = [
     "acm-actors",
     "acm-baselines",
     "acm-concept",
+    "acm-learned",
     "acm-llm",
     "acm-memory",
     "acm-onnx",

@@ -5,12 +5,15 @@
 //! | `plan` | the suite file: what scenes are drawn from |
 //! | `thing`, `deviation`, `outline` | things, things that are a little off, how far things are apart |
 //! | `scene`, `view` | a table of things from a seed; what a camera sees of it |
+//! | `labelled` | clouds of such things with what is true of them, for `acm learn` |
 //! | `score`, `tally` | one answer against the truth; the figures of many |
 //!
 //! Perception gets the noisy frame, the nominal calibration and an empty expectation, and of the second frame what
 //! memory expects after the first. The truth stays here.
 
 mod deviation;
+#[cfg(feature = "learned")]
+pub mod labelled;
 mod outline;
 mod picture;
 mod plan;
@@ -234,7 +237,7 @@ fn draw(
     let least_pixels = if small { plan.small_cubes.least_pixels } else { plan.layout.least_pixels };
     for _ in 0..plan.attempts {
         let Some(scene) = Scene::draw(plan, wanted, &mut workshop, &mut rng)? else { continue };
-        if let Some(view) = eye.view(plan, &scene, least_pixels, seed)? {
+        if let Some(view) = eye.view(plan, &scene, Some(least_pixels), seed)? {
             return Ok((scene, view));
         }
     }

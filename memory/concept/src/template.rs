@@ -364,6 +364,16 @@ impl Template {
         }
         Ok(YawSymmetry::Fold(1))
     }
+    /// The symmetry that holds at all parameter values: headings that it calls equivalent are so always.
+    pub fn common_symmetry(&self) -> YawSymmetry {
+        let certain = self.symmetry.iter().any(|rule| rule.when.is_none());
+        // What no rule covers has no symmetry but the full turn. No fold at all, 0, is a multiple of every other.
+        let folds = self.symmetry.iter().map(|rule| rule.fold).chain((!certain).then_some(1));
+        match folds.fold(0, greatest_common_divisor) {
+            0 => YawSymmetry::Continuous,
+            fold => YawSymmetry::Fold(fold),
+        }
+    }
     /// The symmetry about the vertical of a part that is turned by `rotation` from its upright stance: that of the
     /// rest in which it is, none for a stance that the template does not name.
     pub fn symmetry_at(&self, values: &Values, rotation: DQuat) -> Result<YawSymmetry, ExpressionError> {
@@ -402,6 +412,10 @@ impl Template {
     pub fn function(&self, name: &str) -> Option<&FunctionBinding> {
         self.functions.iter().find(|function| function.name == name)
     }
+}
+
+fn greatest_common_divisor(a: u32, b: u32) -> u32 {
+    if b == 0 { a } else { greatest_common_divisor(b, a % b) }
 }
 
 fn vector(expressions: &[Expression; 3], values: &Values) -> Result<DVec3, ExpressionError> {

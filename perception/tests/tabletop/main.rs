@@ -370,3 +370,27 @@ fn without_a_pose_the_plane_is_zero_and_x_points_right() {
     // The camera looks along the world's y here, so right stays right.
     assert!(mats.iter().any(|mat| (*mat - cube - DVec2::new(0.1, 0.0)).length() < 0.01));
 }
+
+#[test]
+fn a_thing_whose_pixels_are_given_is_guessed_and_fitted() {
+    let (bare, mut world) = (World::table(), World::table());
+    let size = DVec3::new(0.14, 0.08, 0.06);
+    world.block(size, 0.05, -0.05, 0.4, [0.1, 0.5, 0.2]);
+    let frame = Sensor::new(head_camera()).capture(&world, 3);
+    let depth = |world: &World| world.render(&frame.header.intrinsics, &head_camera()).1;
+    let labels: Vec<u16> = depth(&world).iter().zip(depth(&bare)).map(|(a, b)| u16::from(*a < b - 1e-6)).collect();
+    let things = acm_perception::given::things(&frame, &labels, &[0.0, 0.0], &GrounderConfig::default()).unwrap();
+    // The second has no pixel.
+    let [Some(thing), None] = &things[..] else { panic!("{} things", things.iter().flatten().count()) };
+    let library = library();
+    let template = library.get("box").unwrap();
+    let off = |values: &[f64]| values.iter().zip(size.to_array()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    let (guess, fit) = (thing.guess(template).unwrap(), thing.fit(template).unwrap());
+    assert!(off(&guess.values) < 0.02 && off(&fit.values) < 0.006, "{guess:?}, {fit:?}");
+    assert!(YawSymmetry::Fold(2).difference(fit.pose.yaw(), 0.4).to_degrees() < 2.0);
+    assert!(thing.cost(template, &fit) < thing.cost(template, &guess));
+    let mut other = guess.clone();
+    other.values = vec![0.12, 0.1, 0.05];
+    let again = thing.fit_from(template, &other).unwrap();
+    assert!(off(&again.values) < 0.006, "{again:?}");
+}

@@ -55,18 +55,26 @@ impl Eye {
     }
 
     /// The view of a scene whose noise is drawn from a seed; `None` where the scene is not one that could be judged: a
-    /// thing is cut off or hidden, or there is no edge between things that touch.
+    /// thing is cut off, hidden or smaller than `least_pixels`, or there is no edge between things that touch. Without
+    /// `least_pixels` any view will do.
     ///
     /// # Errors
     /// The renderer fails.
-    pub fn view(&mut self, plan: &Plan, scene: &Scene, least_pixels: usize, seed: u64) -> anyhow::Result<Option<View>> {
+    pub fn view(
+        &mut self,
+        plan: &Plan,
+        scene: &Scene,
+        least_pixels: Option<usize>,
+        seed: u64,
+    ) -> anyhow::Result<Option<View>> {
         let (sensor, mut rng) = sensor(plan, seed)?;
         let camera = sensor.true_camera(&scene.camera);
         let rendered = self.renderer.render(&self.stage(scene, None), &camera)?;
         let labels: Vec<u16> = rendered.ids.iter().map(|id| id.saturating_sub(FIRST - 1) as u16).collect();
-        if !(whole(&labels, &rendered, scene.things.len(), least_pixels)
-            && touching(scene).all(|pair| edge_between(plan, &rendered, &camera.intrinsics, &labels, pair))
-            && self.seen(plan, scene, &camera, &labels)?)
+        if let Some(least_pixels) = least_pixels
+            && !(whole(&labels, &rendered, scene.things.len(), least_pixels)
+                && touching(scene).all(|pair| edge_between(plan, &rendered, &camera.intrinsics, &labels, pair))
+                && self.seen(plan, scene, &camera, &labels)?)
         {
             return Ok(None);
         }

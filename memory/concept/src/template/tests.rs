@@ -180,6 +180,21 @@ fn parts_move_with_the_parameters() {
 }
 
 #[test]
+fn the_common_symmetry_holds_at_all_values() {
+    let fold = |rules: &str| {
+        let text = PUCK.replace("[[symmetry]]\nfold = 0\n", rules);
+        Template::parse("puck.toml", &text).unwrap().common_symmetry()
+    };
+    let rule = |fold: u32, when: &str| format!("[[symmetry]]\nfold = {fold}\n{when}\n");
+    let flat = "when = \"height < 0.01\"";
+    assert_eq!(fold(&rule(0, "")), YawSymmetry::Continuous);
+    assert_eq!(fold(&(rule(4, flat) + &rule(2, ""))), YawSymmetry::Fold(2));
+    assert_eq!(fold(&(rule(0, flat) + &rule(3, ""))), YawSymmetry::Fold(3));
+    assert_eq!(fold(&rule(4, flat)), YawSymmetry::Fold(1));
+    assert_eq!(fold(""), YawSymmetry::Fold(1));
+}
+
+#[test]
 fn solids_may_be_hollow_lie_and_be_turned() {
     let solids = |solid: &str| {
         let text = PUCK.replace("shape = \"cylinder\"\nradius = \"radius\"\nheight = \"height\"", solid);
