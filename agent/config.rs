@@ -1,6 +1,7 @@
 //! `--config FILE`: what the agent goes by, as a file.
 
 use acm_actors::settings::Settings;
+use acm_perception::GrounderConfig;
 use anyhow::{Context, bail};
 use std::{fs::File, io::Read, path::Path};
 
@@ -12,6 +13,14 @@ const MAX_BYTES: u64 = 1 << 20;
 /// # Errors
 /// The file cannot be read, is no TOML, or names something that is no setting or has a value out of its range.
 pub fn read(path: &Path) -> anyhow::Result<Settings> {
+    read_over(&GrounderConfig::default(), path)
+}
+
+/// Reads settings; what the file leaves out of `[perception]` is as in `perception`, the rest keeps its default.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_over(perception: &GrounderConfig, path: &Path) -> anyhow::Result<Settings> {
     let name = path.display();
     let file = File::open(path).with_context(|| format!("{name} cannot be read"))?;
     let mut text = String::new();
@@ -19,10 +28,15 @@ pub fn read(path: &Path) -> anyhow::Result<Settings> {
     if text.len() as u64 > MAX_BYTES {
         bail!("{name} is longer than {MAX_BYTES} bytes: no settings are");
     }
-    let settings: Settings = toml::from_str(&text).map_err(|error| {
+    let mut settings: Settings = toml::from_str(&text).map_err(|error| {
         let line = error.span().map_or(1, |span| 1 + text.get(..span.start).unwrap_or_default().matches('\n').count());
         anyhow::anyhow!("{name}, line {line}: {}", error.message().replace('\n', " "))
     })?;
+    let mut merged = toml::Table::try_from(perception)?;
+    if let Some(toml::Value::Table(given)) = toml::from_str::<toml::Table>(&text)?.remove("perception") {
+        merged.extend(given);
+    }
+    settings.perception = merged.try_into()?;
     settings.perception.check().map_err(|reason| anyhow::anyhow!("{name}: perception.{reason}"))?;
     settings.tools.check().map_err(|reason| anyhow::anyhow!("{name}: tools.{reason}"))?;
     Ok(settings)
@@ -45,6 +59,11 @@ mod tests {
         assert_eq!(read_text("").unwrap(), Settings::default());
         let settings = read_text("on_unknown = \"guess\"\n[perception]\nmin_confidence = 0.4\n").unwrap();
         assert_eq!((settings.on_unknown, settings.perception.min_confidence), (OnUnknown::Guess, 0.4));
+        let (dir, unknown) = (tempfile::tempdir().unwrap(), GrounderConfig::of_unknown_camera());
+        let path = dir.path().join("acm.toml");
+        std::fs::write(&path, "[perception]\nmin_confidence = 0.4\n").unwrap();
+        let expected = GrounderConfig { min_confidence: 0.4, ..unknown.clone() };
+        assert_eq!(read_over(&unknown, &path).unwrap().perception, expected);
     }
 
     #[test]

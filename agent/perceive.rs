@@ -47,8 +47,11 @@ pub fn run(args: &PerceiveArgs) -> anyhow::Result<Exit> {
         Some(dir) => Box::new(acm_memory::AcmMemory::open(dir, Arc::clone(&library))?),
         None => Box::new(acm_memory::AcmMemory::in_memory(Arc::clone(&library))),
     };
-    let unknown = || Settings { perception: GrounderConfig::of_unknown_camera(), ..Settings::default() };
-    let settings = args.config.as_deref().map(config::read).transpose()?.unwrap_or_else(unknown);
+    let unknown = GrounderConfig::of_unknown_camera();
+    let settings = match args.config.as_deref() {
+        Some(path) => config::read_over(&unknown, path)?,
+        None => Settings { perception: unknown, ..Settings::default() },
+    };
     let file = args.config.as_deref().map_or_else(String::new, |path| path.display().to_string());
     let tools = tools::open(&file, &settings.tools)?;
     let grounder = Grounder::new(Arc::clone(&library), settings.perception).with_tools(tools);

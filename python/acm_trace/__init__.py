@@ -7,6 +7,7 @@ virtual, in nanoseconds as `t` and in seconds as `seconds`.
 import io
 import json
 import re
+import struct
 from dataclasses import dataclass, field
 from typing import Any, Dict, List, Optional
 
@@ -125,7 +126,8 @@ class Trace:
             reader = NonSeekingReader(file, decoder_factories=[DecoderFactory()])
             try:
                 read(reader)
-            except (McapError, EOFError) as error:
+            # The library reads a record that is cut in its middle with `struct`, which has an error of its own.
+            except (McapError, EOFError, struct.error) as error:
                 self.cut = str(error) or type(error).__name__
 
     def _messages(self, reader):
