@@ -1,5 +1,10 @@
 //! Image-shaped arrays: neighbours, morphology, connected components.
 
+use rayon::prelude::*;
+
+/// Pixels that one thread takes at a time: less is not worth handing over.
+const AT_ONCE: usize = 8192;
+
 /// The shape of a row-by-row image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Grid {
@@ -20,6 +25,10 @@ impl Grid {
     pub fn row(self, index: usize) -> usize {
         index / self.width
     }
+    /// What is said of every pixel, by all processors.
+    pub fn map<T: Send>(self, of: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
+        (0..self.len()).into_par_iter().with_min_len(AT_ONCE).map(of).collect()
+    }
     /// The index `dx` columns and `dy` rows away, if that is in the image.
     pub fn offset(self, index: usize, dx: isize, dy: isize) -> Option<usize> {
         let column = self.column(index).checked_add_signed(dx)?;
@@ -32,25 +41,28 @@ impl Grid {
     }
 
     /// For every pixel, the extreme of a square window of half width `radius` under `pick`.
-    pub fn window(self, values: &[f32], radius: usize, pick: fn(f32, f32) -> f32) -> Vec<f32> {
+    pub fn window(self, values: &[f32], radius: usize, pick: impl Fn(f32, f32) -> f32 + Sync) -> Vec<f32> {
         let mut across = values.to_vec();
-        for row in 0..self.height {
-            let line = &values[row * self.width..(row + 1) * self.width];
-            for column in 0..self.width {
-                let (from, to) = (column.saturating_sub(radius), (column + radius).min(self.width - 1));
-                across[row * self.width + column] = line[from..=to].iter().copied().reduce(pick).unwrap_or(0.0);
-            }
-        }
-        let mut both = across.clone();
-        for row in 0..self.height {
-            let (from, to) = (row.saturating_sub(radius), (row + radius).min(self.height - 1));
-            for other in from..=to {
-                for column in 0..self.width {
-                    let at = row * self.width + column;
-                    both[at] = pick(both[at], across[other * self.width + column]);
+        let rows = across.par_chunks_mut(self.width).zip(values.par_chunks(self.width)).with_min_len(16);
+        rows.for_each(|(across, line)| {
+            for step in 1..=radius.min(self.width.saturating_sub(1)) {
+                for (at, &value) in across.iter_mut().zip(&line[step..]) {
+                    *at = pick(*at, value);
+                }
+                for (at, &value) in across[step..].iter_mut().zip(line) {
+                    *at = pick(*at, value);
                 }
             }
-        }
+        });
+        let mut both = across.clone();
+        both.par_chunks_mut(self.width).enumerate().with_min_len(16).for_each(|(row, both)| {
+            let (from, to) = (row.saturating_sub(radius), (row + radius).min(self.height - 1));
+            for other in from..=to {
+                for (at, &value) in both.iter_mut().zip(&across[other * self.width..(other + 1) * self.width]) {
+                    *at = pick(*at, value);
+                }
+            }
+        });
         both
     }
 

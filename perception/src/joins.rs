@@ -251,8 +251,9 @@ struct Comparison {
 }
 
 fn compare(context: Context, joint: &Evidence, a: &Piece, b: &Piece) -> Option<Comparison> {
-    let one = fit(context, joint, 0.0)?;
-    let (left, right) = (fit(context, &a.evidence, 0.0)?, fit(context, &b.evidence, 0.0)?);
+    let apart = || rayon::join(|| fit(context, &a.evidence, 0.0), || fit(context, &b.evidence, 0.0));
+    let (one, (left, right)) = rayon::join(|| fit(context, joint, 0.0), apart);
+    let (one, left, right) = (one?, left?, right?);
     let penalty = |h: &Hypothesis, evidence: &Evidence| {
         h.minimum.cost + 0.5 * h.minimum.state.len() as f64 * evidence.independent().max(2.0).ln()
     };
