@@ -3,7 +3,7 @@
 //! | module | measures |
 //! |---|---|
 //! | [`real_frames`] | segmentation of labelled frames of a real camera |
-//! | [`suite`] | the fixed rendered suite: things found, their templates, sizes, places, and time |
+//! | [`suite`] | the fixed rendered suite: things found, their templates, sizes, places; time of frames with many things |
 
 pub mod real_frames;
 pub mod suite;
@@ -24,6 +24,8 @@ pub enum PerceptionPart {
     Suite,
     /// Small cubes in small frames.
     SmallCubes,
+    /// Time of frames with ten things.
+    Crowd,
 }
 
 /// Measures the parts that are asked for, or everything.
@@ -38,6 +40,7 @@ pub fn measure(args: &PerceptionArgs, targets: &Targets) -> anyhow::Result<Bench
             PerceptionPart::RealFrames => real_frames::measure(&args.common, &mut result),
             PerceptionPart::Suite => suite::measure(args, targets, &mut result),
             PerceptionPart::SmallCubes => suite::measure_small_cubes(args, &mut result),
+            PerceptionPart::Crowd => suite::crowd::measure(args, &mut result),
         };
         // What the other parts have measured is not lost with it.
         if let Err(error) = measured {
