@@ -30,6 +30,7 @@ use acm_concept::{
 use assisted::Aid;
 use bases::Bodies;
 use glam::{DVec2, DVec3};
+use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Grounds frames into analytic concepts.
@@ -156,7 +157,7 @@ impl Grounder {
         }
         let mut pieces: Vec<(f64, Vec<usize>, Evidence)> = segments
             .pixels()
-            .into_iter()
+            .into_par_iter()
             .filter(|pixels| !pixels.is_empty())
             .map(|pixels| {
                 let evidence = Evidence::of_segment(scene, &segments, &pixels);

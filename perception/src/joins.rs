@@ -10,6 +10,7 @@ use crate::{
 };
 use acm_concept::{solid::PlacedSolid, template::SeenBy};
 use glam::DVec2;
+use rayon::prelude::*;
 use std::collections::BTreeSet;
 
 /// Most joins in one frame.
@@ -78,6 +79,7 @@ enum Relation {
 /// Joins pieces until no two belong together.
 pub(crate) fn join(scene: &Scene, segments: &mut Segments, context: Context) {
     let mut pieces: Vec<Piece> = (0..segments.count as u32)
+        .into_par_iter()
         .zip(segments.pixels())
         .filter_map(|(label, pixels)| Piece::measure(scene, segments, label, pixels))
         .collect();

@@ -11,6 +11,10 @@ use rayon::prelude::*;
 const STRIDE: usize = 4;
 /// Most planes that are scored.
 const MAX_SCORED: usize = 320;
+/// Most of the best that are refined.
+const MAX_REFINED: usize = 12;
+/// Planes whose normals and offsets differ by less are refined to the same one, radians and metres.
+const TWIN: (f64, f64) = (0.01, 0.004);
 /// Most triples that are drawn.
 const MAX_DRAWN: usize = 6000;
 
@@ -49,7 +53,8 @@ pub(crate) fn find(scan: &Scan, excluded: &[bool], upright: Upright, config: &Gr
     let mut candidates = draw(&coarse, upright, config);
     candidates.sort_by_key(|(score, _)| std::cmp::Reverse(*score));
     let (mut best, mut best_size) = (None, 0);
-    candidates.truncate(12);
+    candidates.truncate(MAX_REFINED);
+    drop_twins(&mut candidates);
     let refine = |(_, plane): (usize, Plane)| {
         let refined = refine(&coarse, plane, upright);
         (coarse.largest_patch(&refined).len(), refined)
@@ -129,6 +134,18 @@ fn draw(coarse: &Coarse, upright: Upright, config: &GrounderConfig) -> Vec<(usiz
     }
     let score = |plane: &Plane| (0..count).step_by(thinning).filter(|&i| coarse.is_inlier(plane, i)).count();
     planes.into_par_iter().with_min_len(16).map(|plane| (score(&plane), plane)).collect()
+}
+
+/// Leaves of planes that are nearly the same the first.
+fn drop_twins(candidates: &mut Vec<(usize, Plane)>) {
+    let twins = |a: &Plane, b: &Plane| a.normal.distance(b.normal) < TWIN.0 && (a.offset - b.offset).abs() < TWIN.1;
+    let mut kept: Vec<(usize, Plane)> = Vec::new();
+    for candidate in candidates.drain(..) {
+        if !kept.iter().any(|other| twins(&other.1, &candidate.1)) {
+            kept.push(candidate);
+        }
+    }
+    *candidates = kept;
 }
 
 /// A few rounds of weighted least squares over the inliers.
