@@ -19,6 +19,12 @@ const MAX_JOINS: usize = 24;
 const SAME_TINT: f32 = 20.0;
 /// Parts of one thing that do not touch in the image are nearer to each other than this.
 const NEAR_M: f64 = 0.02;
+/// What does not come lower than this stands on something else than the plane, or hangs.
+const HOVERING_M: f64 = 0.022;
+/// What keeps this off the plane does not stand on it.
+const CLEAR_M: f64 = 0.015;
+/// A handle is nearer to what it is fixed to than this.
+const HANDLE_M: f64 = 0.032;
 /// Share of a fringe's outline along which the thing cuts it off, and of its pixels that are two from its border.
 const FRINGE_CUT: f64 = 0.3;
 const FRINGE_THICK: f64 = 0.1;
@@ -68,6 +74,8 @@ enum Relation {
     Floor,
     /// The second is more of the first's outer surface.
     Surface,
+    /// The second sticks out of the first, as a handle does.
+    Attached,
     /// The second is the inside of the first.
     Inside,
     /// The second is the far end of the first.
@@ -90,7 +98,7 @@ pub(crate) fn join(scene: &Scene, segments: &mut Segments, context: Context) {
         let name = if relation == Relation::Artefact { NONE } else { first };
         for (label, inner) in segments.labels.iter_mut().zip(&mut segments.inner).filter(|(l, _)| **l == second) {
             *label = name;
-            *inner |= matches!(relation, Relation::Inside | Relation::Floor);
+            *inner |= matches!(relation, Relation::Inside | Relation::Floor | Relation::Attached);
         }
         refused.retain(|(_, a, b)| ![first, second].contains(a) && ![first, second].contains(b));
         let mut joined = Vec::new();
@@ -119,6 +127,7 @@ fn related(
         Relation::Artefact,
         Relation::Floor,
         Relation::Surface,
+        Relation::Attached,
         Relation::Inside,
         Relation::OtherEnd,
         Relation::OnePart,
@@ -134,6 +143,7 @@ fn related(
                 Relation::Artefact => is_ramp_of(a, b) || is_fringe_of(scene, a, b),
                 Relation::Floor => is_floor_of(a, b),
                 Relation::Surface => is_fragment_of(scene, a, b),
+                Relation::Attached => is_attached_to(scene, pieces, a, b),
                 Relation::Inside => is_inside_of(scene, segments, context, a, b),
                 Relation::OtherEnd => is_other_end(scene, segments, context, a, b),
                 Relation::OnePart => is_one_with(scene, segments, context, a, b),
@@ -182,7 +192,22 @@ fn is_fragment_of(scene: &Scene, whole: &Piece, small: &Piece) -> bool {
     }
     let tint = |piece: &Piece| Tint::of(&scene.scan.appearance(&piece.pixels).mean);
     let is_scrap = || small.pixels.len() * 8 < whole.pixels.len() && tint(small).distance(&tint(whole)) < 7.0;
-    small.lowest_m > 0.022 || is_scrap()
+    small.lowest_m > HOVERING_M || is_scrap()
+}
+
+/// Whether `small` sticks out of `whole`, as a handle before a door: it is near it and no higher, and hangs in the air with
+/// nothing under it to stand on, nor is it held.
+fn is_attached_to(scene: &Scene, pieces: &[Piece], whole: &Piece, small: &Piece) -> bool {
+    if small.pixels.len() * 3 > whole.pixels.len() || small.top_m > whole.top_m + 0.005 || small.lowest_m < CLEAR_M {
+        return false;
+    }
+    let carries = |other: &&Piece| {
+        let level = small.lowest_m - 0.03..small.lowest_m + 0.015;
+        ![whole.label, small.label].contains(&other.label) && level.contains(&other.top_m)
+    };
+    let held = || small.pixels.iter().any(|&pixel| scene.grid.neighbours(pixel).any(|near| scene.own[near]));
+    let stands = || pieces.iter().filter(carries).any(|other| other.distance_m(small) < NEAR_M);
+    whole.distance_m(small) < HANDLE_M && !held() && !stands()
 }
 
 /// Whether `inner` is the inside of a hollow thing whose outside is `outer`: partly covered by it, its rim level
@@ -284,7 +309,7 @@ fn union(scene: &Scene, segments: &Segments, a: &Piece, b: &Piece, hollow: bool)
 }
 
 fn fit<'a>(context: Context<'a>, evidence: &Evidence, base_m: f64) -> Option<Hypothesis<'a>> {
-    let base_m = if base_m > 0.022 { base_m } else { 0.0 };
+    let base_m = if base_m > HOVERING_M { base_m } else { 0.0 };
     let plan: Vec<DVec2> = evidence.points.iter().map(|p| p.position.truncate()).collect();
     let height_m = evidence.top_m() - base_m;
     let measured = Measured { plan, height_m, base: Base::At(base_m), seen_by: SeenBy::Depth };
