@@ -30,11 +30,19 @@ const FRINGE_CUT: f64 = 0.3;
 const FRINGE_THICK: f64 = 0.1;
 /// Evidence (negative log likelihood) that it takes to believe that two things lie like the parts of one.
 const COINCIDENCE: f64 = 15.0;
+/// Each of two things explains this share of its surface and of its outline.
+const PARTED_SURFACE: f64 = 0.85;
+const PARTED_OUTLINE: f64 = 0.75;
+/// They explain so much more (log likelihood) than one does, and that one less than this share of either: a thing of two
+/// colours is one.
+const PARTED_GAIN: f64 = 10.0;
+const ONE_SURFACE: f64 = 0.93;
+const ONE_OUTLINE: f64 = 0.85;
 /// Tops of pieces of one thing are level within this.
 const LEVEL_M: f64 = 0.016;
 
 /// A segment with what the tests look at.
-struct Piece {
+pub(crate) struct Piece {
     label: u32,
     pixels: Vec<usize>,
     evidence: Evidence,
@@ -43,7 +51,7 @@ struct Piece {
 }
 
 impl Piece {
-    fn measure(scene: &Scene, segments: &Segments, label: u32, pixels: Vec<usize>) -> Option<Piece> {
+    pub fn measure(scene: &Scene, segments: &Segments, label: u32, pixels: Vec<usize>) -> Option<Piece> {
         let evidence = Evidence::of_segment(scene, segments, &pixels);
         let (top_m, lowest_m) = (evidence.top_m(), scene.lowest_m(&pixels));
         (!evidence.points.is_empty()).then_some(Piece { label, pixels, evidence, top_m, lowest_m })
@@ -294,6 +302,25 @@ fn compare(context: Context, joint: &Evidence, a: &Piece, b: &Piece) -> Option<C
         on_surface,
         on_outline,
     })
+}
+
+/// Whether two pieces, which are `whole` together, are two things: two templates explain them well and better than one.
+pub(crate) fn apart_or_together(context: Context, whole: &Piece, a: &Piece, b: &Piece) -> bool {
+    let one = |piece: &Piece| {
+        let best = fit(context, &piece.evidence, piece.lowest_m)?;
+        let parameters = best.minimum.state.len() as f64;
+        let cost = best.minimum.cost + 0.5 * parameters * piece.evidence.independent().max(2.0).ln();
+        Some((cost, best.explained(&piece.evidence)))
+    };
+    let (together, (left, right)) = rayon::join(|| one(whole), || rayon::join(|| one(a), || one(b)));
+    let (Some((together, whole_explained)), Some((left, first)), Some((right, second))) = (together, left, right)
+    else {
+        return false;
+    };
+    let share = (a.evidence.independent() + b.evidence.independent()) / whole.evidence.independent().max(1.0);
+    let explained = |(surface, outline): (f64, f64)| surface > PARTED_SURFACE && outline > PARTED_OUTLINE;
+    let well = whole_explained.0 > ONE_SURFACE && whole_explained.1 > ONE_OUTLINE;
+    !well && explained(first) && explained(second) && left + right + PARTED_GAIN < together * share.max(1.0)
 }
 
 /// The evidence of two pieces as one; without the inner piece's surface if it is the inside of something hollow.

@@ -36,6 +36,7 @@ mod hypotheses;
 mod joins;
 mod measure;
 mod own;
+mod parting;
 mod patches;
 mod raster;
 mod scan;
