@@ -64,10 +64,12 @@ pub struct GrounderConfig {
     /// Error of sizes that no averaging removes. The default holds for a calibrated camera; of an unknown one sizes were
     /// wrong by several millimetres, see [`GrounderConfig::of_unknown_camera`].
     pub size_sigma_floor_m: f64,
-    /// Error of sizes as a share of them: things deviate from their template's shape.
+    /// Error of heights as a share of them.
     pub size_sigma_share: f64,
-    /// Error of sizes as a share of how far the outline misses the fitted one.
-    pub size_sigma_misfit: f64,
+    /// Error of extents as a share of how far the outline misses the fitted one: of those between walls, which lean and
+    /// are rounded at their edges, and of those up to a top, which depth shows too.
+    pub size_sigma_walls: f64,
+    pub size_sigma_top: f64,
     /// Objects with a lower confidence are not reported.
     pub min_confidence: f64,
 }
@@ -102,9 +104,10 @@ impl Default for GrounderConfig {
             sigma_factor: 1.7,
             sigma_floor_m: 0.003,
             sigma_range: 0.005,
-            size_sigma_floor_m: 0.0004,
-            size_sigma_share: 0.01,
-            size_sigma_misfit: 0.55,
+            size_sigma_floor_m: 0.00045,
+            size_sigma_share: 0.004,
+            size_sigma_walls: 1.5,
+            size_sigma_top: 0.3,
             min_confidence: 0.15,
         }
     }
@@ -135,7 +138,8 @@ impl GrounderConfig {
             ("sigma_factor", self.sigma_factor),
             ("sigma_floor_m", self.sigma_floor_m),
             ("size_sigma_floor_m", self.size_sigma_floor_m),
-            ("size_sigma_misfit", self.size_sigma_misfit),
+            ("size_sigma_walls", self.size_sigma_walls),
+            ("size_sigma_top", self.size_sigma_top),
         ];
         let shares = [
             ("min_depth_fraction", self.min_depth_fraction),

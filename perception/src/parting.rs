@@ -11,7 +11,7 @@ use crate::{
 
 /// Two colours differ by at least this, in the units of a tint, and by so many times their own spread.
 const CONTRAST: f32 = 14.0;
-const TIMES_SPREAD: f32 = 2.5;
+const TIMES_SPREAD: f32 = 4.3;
 /// What has one colour is mostly in one place; a pattern is not.
 const IN_ONE_PLACE: f64 = 0.85;
 /// Most cuts in one frame.

@@ -9,7 +9,7 @@ use crate::{
 use acm_concept::{
     object::{GroundedObject, GroundedPart, Observability, ParameterEstimate, PixelSupport, PoseEstimate},
     pose::Pose,
-    template::{PartSpec, Unit},
+    template::{PartSpec, Template, Unit},
 };
 use glam::{DQuat, DVec2, DVec3};
 
@@ -122,18 +122,37 @@ fn measured_parameters(
     let (model, minimum) = (&hypothesis.model, &hypothesis.minimum);
     let values = model.placement(&minimum.state).values;
     let spread = |low: f64, high: f64| (high - low).abs() / 12f64.sqrt();
+    let size = |i: usize, fitted: f64| calibration.size(fitted, values[i], growth(model.template, &values, i));
     let estimate = |(i, &observability): (usize, &Observability)| {
         let spec = &model.template.parameters[i];
         let fitted = model.parameter_index(i).map_or(0.0, |index| deviation(hypothesis, index));
         let sigma = match (observability, spec.unit) {
             (Observability::PriorOnly, _) => spread(spec.min, spec.max),
-            (Observability::Interval { low, high }, _) => calibration.size(fitted, values[i]).max(spread(low, high)),
-            (Observability::Observed, Unit::M) => calibration.size(fitted, values[i]),
+            (Observability::Interval { low, high }, _) => size(i, fitted).max(spread(low, high)),
+            (Observability::Observed, Unit::M) => size(i, fitted),
             (Observability::Observed, _) => calibration.angle(fitted, 0.05),
         };
         ParameterEstimate { name: spec.name.clone(), value: values[i], sigma, observability }
     };
     profile.parameters.iter().enumerate().map(estimate).collect()
+}
+
+/// How much the larger extent across (x) and the height (y) of a template's solids grow with a parameter: 2 of a
+/// diameter with its radius. What moves neither counts as an extent across of its own.
+fn growth(template: &Template, values: &[f64], parameter: usize) -> DVec2 {
+    const STEP: f64 = 1e-4;
+    let extents = |values: &[f64]| {
+        let solids = template.solids(&template.named(values)).unwrap_or_default();
+        let bounds = solids.iter().map(|solid| solid.bounds());
+        let (low, high) =
+            bounds.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |all, own| (all.0.min(own.0), all.1.max(own.1)));
+        high - low
+    };
+    let mut moved = values.to_vec();
+    moved[parameter] += STEP;
+    let grown = ((extents(&moved) - extents(values)) / STEP).abs();
+    let growth = DVec2::new(grown.x.max(grown.y), grown.z);
+    if growth.is_finite() && growth.max_element() > 0.1 { growth } else { DVec2::X }
 }
 
 /// The pose in the world. Among equivalent headings it is the one nearest to zero; of a part that lies as memory knows
@@ -172,7 +191,7 @@ fn world_pose(scene: &Scene, hypothesis: &Hypothesis, remembered: Option<&Ground
 
 /// Turns the standard deviations of a fit into honest ones. Places err with the camera's calibration:
 /// sigma^2 = (k sigma_fit)^2 + floor^2 + (share z)^2. Sizes do not, but things are not quite of their template's shape:
-/// sigma^2 = sigma_fit^2 + floor^2 + (share misfit)^2 + (share size)^2, where the misfit is that of the outline.
+/// sigma^2 = sigma_fit^2 + floor^2 + (share misfit)^2 + (share height)^2, where the misfit is that of the outline.
 struct Calibration<'a> {
     config: &'a GrounderConfig,
     systematic_m: f64,
@@ -189,8 +208,13 @@ impl Calibration<'_> {
             misfit_m: misfit_px * distance / scene.scan.intrinsics.fx,
         }
     }
-    fn size(&self, fitted: f64, value: f64) -> f64 {
-        let shape = (self.config.size_sigma_misfit * self.misfit_m).hypot(self.config.size_sigma_share * value);
+    /// `growth` is how much the extent across and the height grow with the parameter.
+    fn size(&self, fitted: f64, value: f64, growth: DVec2) -> f64 {
+        let shape = if growth.y > growth.x {
+            (self.config.size_sigma_top * self.misfit_m / growth.y).hypot(self.config.size_sigma_share * value)
+        } else {
+            self.config.size_sigma_walls * self.misfit_m / growth.x
+        };
         fitted.hypot(shape).hypot(self.config.size_sigma_floor_m)
     }
     fn length(&self, fitted: f64) -> f64 {
