@@ -5,7 +5,7 @@ use crate::{
     settings::Turning,
 };
 use acm_concept::{camera::RgbdFrame, embodiment::RobotDescription, expectation::Expectation};
-use acm_perception::Grounder;
+use acm_perception::{Grounder, LastPictures};
 use acm_runtime::{
     core::{Core, CoreError, Outbox},
     envelope::Envelope,
@@ -20,6 +20,8 @@ pub struct PerceptionActor {
     bus: Arc<dyn FrameBus<RgbdFrame>>,
     /// The expectation for the frame that was asked for.
     expectation: Option<Expectation>,
+    /// By which a camera that has stopped is known.
+    last: LastPictures,
 }
 
 impl PerceptionActor {
@@ -29,7 +31,7 @@ impl PerceptionActor {
         robot: RobotDescription,
         bus: Arc<dyn FrameBus<RgbdFrame>>,
     ) -> PerceptionActor {
-        PerceptionActor { grounder, robot, bus, expectation: None }
+        PerceptionActor { grounder, robot, bus, expectation: None, last: LastPictures::default() }
     }
 }
 
@@ -51,7 +53,7 @@ impl Core<Message> for PerceptionActor {
                 let mut expectation = self.expectation.take().unwrap_or_default();
                 expectation.time = header.time;
                 expectation.robot = self.robot.body(&feedback);
-                let percepts = Box::new(self.grounder.now().ground(&frame, &expectation));
+                let percepts = Box::new(self.grounder.now().ground_next(&mut self.last, &frame, &expectation));
                 outbox.send(MEMORY, Message::Percepts { percepts, feedback });
             }
             other => return Err(CoreError(format!("perception cannot handle {other:?}"))),

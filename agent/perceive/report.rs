@@ -315,6 +315,7 @@ fn blind_words(blindness: Blindness) -> &'static str {
         Blindness::DepthScale => "the depth is nearly all nearer than 0.12 or farther than 6 m: --depth-scale is wrong",
         Blindness::NoColor => "the colour image is black",
         Blindness::Overexposed => "the colour image is white",
+        Blindness::Frozen => "the camera has stopped: the picture is the last one again",
         Blindness::NoSupport => {
             "no level surface on which things could stand: there is none, or the intrinsics or the pose are wrong"
         }

@@ -66,9 +66,10 @@ pub struct GrounderConfig {
     pub size_sigma_floor_m: f64,
     /// Error of heights as a share of them.
     pub size_sigma_share: f64,
-    /// Error of extents as a share of how far the outline misses the fitted one: of those between walls, which lean and
-    /// are rounded at their edges, and of those up to a top, which depth shows too.
+    /// Error of an extent between walls, which lean and are rounded at their edges, as a share of how far the outline
+    /// misses the fitted one.
     pub size_sigma_walls: f64,
+    /// The same of the height of a top, which depth shows too.
     pub size_sigma_top: f64,
     /// Objects with a lower confidence are not reported.
     pub min_confidence: f64,

@@ -14,6 +14,7 @@ use crate::{
     config::GrounderConfig,
     expected::{self, Remembered},
     fit::{Base, Evidence},
+    frozen::LastPictures,
     hypotheses::{self, Context, Hypothesis, Measured},
     own, patches,
     scan::Scan,
@@ -64,6 +65,16 @@ impl Grounder {
     /// not over a nominal one.
     pub fn ground(&self, frame: &RgbdFrame, expectation: &Expectation) -> Percepts {
         self.ground_with(frame, expectation, &mut Aid::none())
+    }
+
+    /// Says what the next frame of a live camera shows: as [`Grounder::ground`] does, and nothing where the camera gives its
+    /// last picture again.
+    pub fn ground_next(&self, last: &mut LastPictures, frame: &RgbdFrame, expectation: &Expectation) -> Percepts {
+        let percepts = self.ground(frame, expectation);
+        if last.repeats(frame, &percepts) {
+            return self.blind(frame, expectation, Blindness::Frozen, percepts.depth_fraction);
+        }
+        percepts
     }
 
     fn ground_with(&self, frame: &RgbdFrame, expectation: &Expectation, aid: &mut Aid) -> Percepts {

@@ -31,6 +31,7 @@ pub mod tools;
 
 mod expected;
 mod fit;
+mod frozen;
 mod grid;
 mod hypotheses;
 mod joins;
@@ -45,5 +46,6 @@ mod segments;
 mod support;
 
 pub use config::GrounderConfig;
+pub use frozen::LastPictures;
 pub use grounder::{Assisted, AssistedGrounder, Grounder};
 pub use level::level;

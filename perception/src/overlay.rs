@@ -54,6 +54,7 @@ pub fn draw(frame: &RgbdFrame, percepts: &Percepts, names: &[Option<String>], li
             Blindness::NoColor => "blind: the colour image is black",
             Blindness::Overexposed => "blind: the colour image is white",
             Blindness::NoSupport => "blind: no surface on which things could stand",
+            Blindness::Frozen => "blind: the last picture again",
         };
         note(&mut image, &[reason.into()]);
     }

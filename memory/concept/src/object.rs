@@ -231,6 +231,8 @@ pub enum Blindness {
     Overexposed,
     /// There is depth, but no surface on which things could stand.
     NoSupport,
+    /// The camera has stopped: the picture is its last one again, bit for bit, although time has passed.
+    Frozen,
 }
 
 /// Everything perception says about one frame. Abstaining is an ordinary answer: then `blindness` says why

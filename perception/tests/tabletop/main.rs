@@ -11,8 +11,9 @@ use acm_concept::{
     object::{Blindness, GroundedObject, Observability, Percepts, Visibility},
     pose::Pose,
     template::{TemplateLibrary, YawSymmetry},
+    time::Time,
 };
-use acm_perception::{Grounder, GrounderConfig, level};
+use acm_perception::{Grounder, GrounderConfig, LastPictures, level};
 use glam::{DVec2, DVec3};
 use sensor::Sensor;
 use std::sync::Arc;
@@ -199,6 +200,26 @@ fn blindness_is_an_answer() {
         assert_eq!(percepts.expected.len(), expectation.objects.len());
         assert!(percepts.expected.iter().all(|view| view.visibility == Visibility::NotMeasured));
     }
+}
+
+#[test]
+fn a_camera_that_has_stopped_shows_nothing() {
+    let sensor = Sensor::new(head_camera());
+    let frame = sensor.capture(&World::put_back_block((0.1, -0.1, 0.0)), 3);
+    let later = |frame: &RgbdFrame, millis: f64| {
+        let mut header = frame.header.clone();
+        header.time = Time::from_seconds(header.time.seconds() + 1e-3 * millis);
+        RgbdFrame::new(header, frame.color.clone(), frame.depth.clone()).unwrap()
+    };
+    let (grounder, mut last) = (grounder(), LastPictures::default());
+    let mut blindness = |frame: &RgbdFrame| grounder.ground_next(&mut last, frame, &instruction()).blindness;
+    assert_eq!(blindness(&frame), None);
+    // Asked for again at once it is the same picture, and no sign of anything.
+    assert_eq!(blindness(&frame), None);
+    assert_eq!(blindness(&later(&frame, 100.0)), Some(Blindness::Frozen));
+    assert_eq!(blindness(&later(&frame, 200.0)), Some(Blindness::Frozen));
+    let moving = sensor.capture(&World::put_back_block((0.1, -0.1, 0.0)), 4);
+    assert_eq!(blindness(&later(&moving, 300.0)), None);
 }
 
 /// What a memory would expect after these percepts: the same things in the same places.
