@@ -2,9 +2,11 @@
 //!
 //! | module | measures |
 //! |---|---|
+//! | [`reading`] | digits, marks, lamps and needles on rendered things |
 //! | [`real_frames`] | segmentation of labelled frames of a real camera |
 //! | [`suite`] | the fixed rendered suite: things found, their templates, sizes, places, and time |
 
+pub mod reading;
 pub mod real_frames;
 pub mod suite;
 
@@ -24,6 +26,8 @@ pub enum PerceptionPart {
     Suite,
     /// Small cubes in small frames.
     SmallCubes,
+    /// Digits, marks, lamps and needles.
+    Reading,
 }
 
 /// Measures the parts that are asked for, or everything.
@@ -38,6 +42,7 @@ pub fn measure(args: &PerceptionArgs, targets: &Targets) -> anyhow::Result<Bench
             PerceptionPart::RealFrames => real_frames::measure(&args.common, &mut result),
             PerceptionPart::Suite => suite::measure(args, targets, &mut result),
             PerceptionPart::SmallCubes => suite::measure_small_cubes(args, &mut result),
+            PerceptionPart::Reading => reading::measure(args, &mut result),
         };
         // What the other parts have measured is not lost with it.
         if let Err(error) = measured {
