@@ -4,7 +4,7 @@
 //! |---|---|
 //! | [`reading`] | digits, marks, lamps and needles on rendered things |
 //! | [`real_frames`] | segmentation of labelled frames of a real camera |
-//! | [`suite`] | the fixed rendered suite: things found, their templates, sizes, places, and time |
+//! | [`suite`] | the fixed rendered suite: things found, their templates, sizes, places; time of frames with many things |
 
 pub mod reading;
 pub mod real_frames;
@@ -26,6 +26,8 @@ pub enum PerceptionPart {
     Suite,
     /// Small cubes in small frames.
     SmallCubes,
+    /// Time of frames with ten things.
+    Crowd,
     /// Digits, marks, lamps and needles.
     Reading,
 }
@@ -42,6 +44,7 @@ pub fn measure(args: &PerceptionArgs, targets: &Targets) -> anyhow::Result<Bench
             PerceptionPart::RealFrames => real_frames::measure(&args.common, &mut result),
             PerceptionPart::Suite => suite::measure(args, targets, &mut result),
             PerceptionPart::SmallCubes => suite::measure_small_cubes(args, &mut result),
+            PerceptionPart::Crowd => suite::crowd::measure(args, &mut result),
             PerceptionPart::Reading => reading::measure(args, &mut result),
         };
         // What the other parts have measured is not lost with it.

@@ -1,5 +1,10 @@
 //! Image-shaped arrays: neighbours, morphology, connected components.
 
+use rayon::prelude::*;
+
+/// Pixels that one thread takes at a time: less is not worth handing over.
+const AT_ONCE: usize = 8192;
+
 /// The shape of a row-by-row image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Grid {
@@ -20,6 +25,10 @@ impl Grid {
     pub fn row(self, index: usize) -> usize {
         index / self.width
     }
+    /// What is said of every pixel, by all processors.
+    pub fn map<T: Send>(self, of: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
+        (0..self.len()).into_par_iter().with_min_len(AT_ONCE).map(of).collect()
+    }
     /// The index `dx` columns and `dy` rows away, if that is in the image.
     pub fn offset(self, index: usize, dx: isize, dy: isize) -> Option<usize> {
         let column = self.column(index).checked_add_signed(dx)?;
@@ -28,59 +37,66 @@ impl Grid {
     }
     /// The four direct neighbours that are in the image.
     pub fn neighbours(self, index: usize) -> impl Iterator<Item = usize> {
-        [(1, 0), (0, 1), (-1, 0), (0, -1)].into_iter().filter_map(move |(dx, dy)| self.offset(index, dx, dy))
+        let (column, width) = (self.column(index), self.width);
+        let right = (column + 1 < width).then_some(index + 1);
+        let below = (index + width < self.len()).then_some(index + width);
+        let left = (column > 0).then(|| index - 1);
+        [right, below, left, index.checked_sub(width)].into_iter().flatten()
     }
 
     /// For every pixel, the extreme of a square window of half width `radius` under `pick`.
-    pub fn window(self, values: &[f32], radius: usize, pick: fn(f32, f32) -> f32) -> Vec<f32> {
+    pub fn window(self, values: &[f32], radius: usize, pick: impl Fn(f32, f32) -> f32 + Sync) -> Vec<f32> {
         let mut across = values.to_vec();
-        for row in 0..self.height {
-            let line = &values[row * self.width..(row + 1) * self.width];
-            for column in 0..self.width {
-                let (from, to) = (column.saturating_sub(radius), (column + radius).min(self.width - 1));
-                across[row * self.width + column] = line[from..=to].iter().copied().reduce(pick).unwrap_or(0.0);
-            }
-        }
-        let mut both = across.clone();
-        for row in 0..self.height {
-            let (from, to) = (row.saturating_sub(radius), (row + radius).min(self.height - 1));
-            for other in from..=to {
-                for column in 0..self.width {
-                    let at = row * self.width + column;
-                    both[at] = pick(both[at], across[other * self.width + column]);
+        let rows = across.par_chunks_mut(self.width).zip(values.par_chunks(self.width)).with_min_len(16);
+        rows.for_each(|(across, line)| {
+            for step in 1..=radius.min(self.width.saturating_sub(1)) {
+                for (at, &value) in across.iter_mut().zip(&line[step..]) {
+                    *at = pick(*at, value);
+                }
+                for (at, &value) in across[step..].iter_mut().zip(line) {
+                    *at = pick(*at, value);
                 }
             }
-        }
+        });
+        let mut both = across.clone();
+        both.par_chunks_mut(self.width).enumerate().with_min_len(16).for_each(|(row, both)| {
+            let (from, to) = (row.saturating_sub(radius), (row + radius).min(self.height - 1));
+            for other in from..=to {
+                for (at, &value) in both.iter_mut().zip(&across[other * self.width..(other + 1) * self.width]) {
+                    *at = pick(*at, value);
+                }
+            }
+        });
         both
     }
 
     /// Number of set pixels in the square window of half width `radius` round each pixel.
     pub fn count(self, mask: &[bool], radius: usize) -> Vec<u16> {
         let mut across = vec![0u16; self.len()];
-        for row in 0..self.height {
-            let line = &mask[row * self.width..(row + 1) * self.width];
+        let rows = across.par_chunks_mut(self.width).zip(mask.par_chunks(self.width)).with_min_len(16);
+        rows.for_each(|(across, line)| {
             let mut sum = line.iter().take(radius.min(self.width)).filter(|set| **set).count() as u16;
-            for column in 0..self.width {
+            for (column, across) in across.iter_mut().enumerate() {
                 if column + radius < self.width {
                     sum += u16::from(line[column + radius]);
                 }
-                across[row * self.width + column] = sum;
+                *across = sum;
                 if column >= radius {
                     sum -= u16::from(line[column - radius]);
                 }
             }
-        }
-        let mut both = vec![0u16; self.len()];
-        for column in 0..self.width {
-            let mut sum: u16 = (0..radius.min(self.height)).map(|row| across[row * self.width + column]).sum();
-            for row in 0..self.height {
-                if row + radius < self.height {
-                    sum += across[(row + radius) * self.width + column];
-                }
-                both[row * self.width + column] = sum;
-                if row >= radius {
-                    sum -= across[(row - radius) * self.width + column];
-                }
+        });
+        let (row, mut both) = (|row: usize| &across[row * self.width..(row + 1) * self.width], vec![0u16; self.len()]);
+        let mut sums = vec![0u16; self.width];
+        let add = |sums: &mut [u16], line: &[u16]| sums.iter_mut().zip(line).for_each(|(sum, one)| *sum += one);
+        (0..radius.min(self.height)).for_each(|at| add(&mut sums, row(at)));
+        for (at, both) in both.chunks_mut(self.width).enumerate() {
+            if at + radius < self.height {
+                add(&mut sums, row(at + radius));
+            }
+            both.copy_from_slice(&sums);
+            if at >= radius {
+                sums.iter_mut().zip(row(at - radius)).for_each(|(sum, one)| *sum -= one);
             }
         }
         both
@@ -96,26 +112,26 @@ impl Grid {
     }
 
     /// Four-connected components of the set pixels that `joined` allows to be linked: a label for every pixel
-    /// (`u32::MAX` for background) and the sizes.
+    /// (`u32::MAX` for background) and the sizes. `joined` gets the smaller index first.
     pub fn components(self, mask: &[bool], joined: impl Fn(usize, usize) -> bool) -> (Vec<u32>, Vec<usize>) {
-        let mut sets = DisjointSets::new(self.len());
-        for index in (0..self.len()).filter(|&i| mask[i]) {
-            if self.column(index) + 1 < self.width && mask[index + 1] && joined(index, index + 1) {
-                sets.join(index, index + 1);
+        let (mut labels, mut sizes, mut front) = (vec![u32::MAX; self.len()], Vec::new(), Vec::new());
+        for first in 0..self.len() {
+            if !mask[first] || labels[first] != u32::MAX {
+                continue;
             }
-            if index + self.width < self.len() && mask[index + self.width] && joined(index, index + self.width) {
-                sets.join(index, index + self.width);
+            let (name, mut size) = (sizes.len() as u32, 0);
+            labels[first] = name;
+            front.push(first);
+            while let Some(index) = front.pop() {
+                size += 1;
+                for near in self.neighbours(index) {
+                    if mask[near] && labels[near] == u32::MAX && joined(index.min(near), index.max(near)) {
+                        labels[near] = name;
+                        front.push(near);
+                    }
+                }
             }
-        }
-        let (mut names, mut labels, mut sizes) = (vec![u32::MAX; self.len()], vec![u32::MAX; self.len()], Vec::new());
-        for index in (0..self.len()).filter(|&i| mask[i]) {
-            let root = sets.root(index);
-            if names[root] == u32::MAX {
-                names[root] = sizes.len() as u32;
-                sizes.push(0);
-            }
-            labels[index] = names[root];
-            sizes[names[root] as usize] += 1;
+            sizes.push(size);
         }
         (labels, sizes)
     }

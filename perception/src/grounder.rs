@@ -30,6 +30,7 @@ use acm_concept::{
 use assisted::Aid;
 use bases::Bodies;
 use glam::{DVec2, DVec3};
+use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Grounds frames into analytic concepts.
@@ -160,7 +161,7 @@ impl Grounder {
         }
         let mut pieces: Vec<(f64, Vec<usize>, Evidence)> = segments
             .pixels()
-            .into_iter()
+            .into_par_iter()
             .filter(|pixels| !pixels.is_empty())
             .map(|pixels| {
                 let evidence = Evidence::of_segment(scene, &segments, &pixels);

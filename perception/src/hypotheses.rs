@@ -18,6 +18,7 @@ use acm_concept::{
 };
 use glam::{DQuat, DVec2, DVec3, Vec2Swizzles};
 use nalgebra::DMatrix;
+use rayon::prelude::*;
 use std::{collections::BTreeMap, f64::consts::FRAC_PI_2};
 
 /// What is measured of a segment, and where it stands.
@@ -78,6 +79,8 @@ const FORLORN_FACTOR: f64 = 4.0;
 const FORLORN_COST: f64 = 100.0;
 /// Shares of its range at which a hinge is tried.
 const OPENED: [f64; 2] = [0.25, 0.65];
+/// Rough fits look at every so many-th point.
+const ROUGHLY: usize = 2;
 /// Starts that are fitted of each template.
 const STARTS: usize = 2;
 
@@ -95,18 +98,20 @@ pub(crate) fn rank<'a>(context: Context<'a>, measured: &Measured, evidence: &Evi
         let rests = template.rests.iter().filter(lying).map(Some);
         std::iter::once(None).chain(rests).map(move |rest| (template, rest))
     });
-    let starts: Vec<Starts> =
-        stances.filter_map(|stance| Starts::of(stance, measured, &rectangles, circle, evidence)).collect();
+    let stances: Vec<_> = stances.collect();
+    let rough = evidence.thinned(ROUGHLY);
+    let of = |stance| Starts::of(stance, measured, &rectangles, circle, &rough);
+    let starts: Vec<Starts> = stances.into_par_iter().filter_map(of).collect();
     let least = starts.iter().map(|s| s.rough).fold(f64::INFINITY, f64::min);
     // What is far behind before any fit is not worth a rough one.
     let near: Vec<Approach> = starts
-        .into_iter()
+        .into_par_iter()
         .filter(|s| s.rough < FORLORN_FACTOR * least + FORLORN_COST)
-        .filter_map(|s| s.nearest(evidence))
+        .filter_map(|s| s.nearest(&rough))
         .collect();
     let best = near.iter().map(|a| a.cost).fold(f64::INFINITY, f64::min);
     // What is far behind after the rough fit is not worth a fine one.
-    let promising = near.into_iter().filter(|a| a.cost < HOPELESS_FACTOR * best + HOPELESS_COST);
+    let promising = near.into_par_iter().filter(|a| a.cost < HOPELESS_FACTOR * best + HOPELESS_COST);
     let mut scored: Vec<Hypothesis<'a>> = promising
         .filter_map(|Approach { model, state, .. }| {
             let minimum = canonical(&model, minimise(&model, evidence, &state), evidence)?;
@@ -128,15 +133,19 @@ pub(crate) fn rank<'a>(context: Context<'a>, measured: &Measured, evidence: &Evi
     scored.into_iter().zip(odds).map(|(h, odd)| Hypothesis { probability: odd / total, ..h }).collect()
 }
 
-/// What is settled in memory and explains the evidence as well as noise lets anything do: only its place is fitted,
-/// beginning where it is expected, and no other template is tried.
+/// What memory knows and what explains the evidence as well as noise lets anything do, fitted from where it is expected:
+/// no other template is tried. Of what is settled only the place is fitted.
 fn recognise<'a>(context: Context<'a>, measured: &Measured, evidence: &Evidence) -> Option<Hypothesis<'a>> {
-    let Known { part, .. } = context.remembered.filter(|known| known.settled)?;
+    // What is not settled must be seen whole: of what is cut off the ranking decides whether memory's sizes are taken over.
+    let whole = evidence.cut_share() <= TRACKED_CUT;
+    let Known { part, settled } = context.remembered.filter(|known| known.settled || whole)?;
     let (model, (at, yaw)) = as_remembered(context, part, measured)?;
+    let (model, tracked) = if settled { (model.rigid(), Some(part)) } else { (model, None) };
     let start = model.start(at, yaw);
-    let minimum = minimise(&model, evidence, &approach(&model, evidence, &start));
+    let near = approach(&model, &evidence.thinned(ROUGHLY), &start);
+    let minimum = canonical(&model, minimise(&model, evidence, &near), evidence)?;
     let score = score(context, &model, &minimum, evidence);
-    let found = Hypothesis { model, minimum, score, probability: 1.0, tracked: Some(part) };
+    let found = Hypothesis { model, minimum, score, probability: 1.0, tracked };
     let (on_surface, on_outline) = found.explained(evidence);
     let misfit = found.minimum.cost / (0.5 * evidence.independent()).max(1.0);
     (misfit < RECOGNISED_MISFIT && on_surface > RECOGNISED && on_outline > RECOGNISED_OUTLINE).then_some(found)
@@ -249,7 +258,7 @@ fn as_remembered<'a>(
     let template = context.library.get(&part.template).filter(|t| t.seen_by == measured.seen_by)?;
     let values: Vec<f64> = template.parameters.iter().map(|p| part.value(&p.name)).collect::<Option<_>>()?;
     let rest = template.rests.iter().find(|rest| rest.holds(part.up()));
-    let model = Model::new(template, values, measured.base)?.lying(rest).rigid();
+    let model = Model::new(template, values, measured.base)?.lying(rest);
     let turn = rest.map_or(DQuat::IDENTITY, |rest| rest.turn());
     let middle = solids(std::slice::from_ref(part), context.library).iter().map(|s| s.pose.translation).sum::<DVec3>();
     let place = match rest {
@@ -270,6 +279,7 @@ fn track<'a>(
 ) -> Option<Hypothesis<'a>> {
     let Known { part, .. } = context.remembered.filter(|_| evidence.cut_share() > TRACKED_CUT)?;
     let (model, own) = as_remembered(context, part, measured)?;
+    let model = model.rigid();
     let starts = std::iter::once(own).chain(rectangles.iter().map(|r| (r.centre, r.yaw)));
     let rough = |(at, yaw): (DVec2, f64)| {
         let start = model.start(at, yaw);

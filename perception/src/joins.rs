@@ -10,6 +10,7 @@ use crate::{
 };
 use acm_concept::{solid::PlacedSolid, template::SeenBy};
 use glam::DVec2;
+use rayon::prelude::*;
 use std::collections::BTreeSet;
 
 /// Most joins in one frame.
@@ -18,16 +19,30 @@ const MAX_JOINS: usize = 24;
 const SAME_TINT: f32 = 20.0;
 /// Parts of one thing that do not touch in the image are nearer to each other than this.
 const NEAR_M: f64 = 0.02;
+/// What does not come lower than this stands on something else than the plane, or hangs.
+const HOVERING_M: f64 = 0.022;
+/// What keeps this off the plane does not stand on it.
+const CLEAR_M: f64 = 0.015;
+/// A handle is nearer to what it is fixed to than this.
+const HANDLE_M: f64 = 0.032;
 /// Share of a fringe's outline along which the thing cuts it off, and of its pixels that are two from its border.
 const FRINGE_CUT: f64 = 0.3;
 const FRINGE_THICK: f64 = 0.1;
 /// Evidence (negative log likelihood) that it takes to believe that two things lie like the parts of one.
 const COINCIDENCE: f64 = 15.0;
+/// Each of two things explains this share of its surface and of its outline.
+const PARTED_SURFACE: f64 = 0.85;
+const PARTED_OUTLINE: f64 = 0.75;
+/// They explain so much more (log likelihood) than one does, and that one less than this share of either: a thing of two
+/// colours is one.
+const PARTED_GAIN: f64 = 10.0;
+const ONE_SURFACE: f64 = 0.93;
+const ONE_OUTLINE: f64 = 0.85;
 /// Tops of pieces of one thing are level within this.
 const LEVEL_M: f64 = 0.016;
 
 /// A segment with what the tests look at.
-struct Piece {
+pub(crate) struct Piece {
     label: u32,
     pixels: Vec<usize>,
     evidence: Evidence,
@@ -36,7 +51,7 @@ struct Piece {
 }
 
 impl Piece {
-    fn measure(scene: &Scene, segments: &Segments, label: u32, pixels: Vec<usize>) -> Option<Piece> {
+    pub fn measure(scene: &Scene, segments: &Segments, label: u32, pixels: Vec<usize>) -> Option<Piece> {
         let evidence = Evidence::of_segment(scene, segments, &pixels);
         let (top_m, lowest_m) = (evidence.top_m(), scene.lowest_m(&pixels));
         (!evidence.points.is_empty()).then_some(Piece { label, pixels, evidence, top_m, lowest_m })
@@ -67,6 +82,8 @@ enum Relation {
     Floor,
     /// The second is more of the first's outer surface.
     Surface,
+    /// The second sticks out of the first, as a handle does.
+    Attached,
     /// The second is the inside of the first.
     Inside,
     /// The second is the far end of the first.
@@ -78,6 +95,7 @@ enum Relation {
 /// Joins pieces until no two belong together.
 pub(crate) fn join(scene: &Scene, segments: &mut Segments, context: Context) {
     let mut pieces: Vec<Piece> = (0..segments.count as u32)
+        .into_par_iter()
         .zip(segments.pixels())
         .filter_map(|(label, pixels)| Piece::measure(scene, segments, label, pixels))
         .collect();
@@ -88,7 +106,7 @@ pub(crate) fn join(scene: &Scene, segments: &mut Segments, context: Context) {
         let name = if relation == Relation::Artefact { NONE } else { first };
         for (label, inner) in segments.labels.iter_mut().zip(&mut segments.inner).filter(|(l, _)| **l == second) {
             *label = name;
-            *inner |= matches!(relation, Relation::Inside | Relation::Floor);
+            *inner |= matches!(relation, Relation::Inside | Relation::Floor | Relation::Attached);
         }
         refused.retain(|(_, a, b)| ![first, second].contains(a) && ![first, second].contains(b));
         let mut joined = Vec::new();
@@ -117,6 +135,7 @@ fn related(
         Relation::Artefact,
         Relation::Floor,
         Relation::Surface,
+        Relation::Attached,
         Relation::Inside,
         Relation::OtherEnd,
         Relation::OnePart,
@@ -132,6 +151,7 @@ fn related(
                 Relation::Artefact => is_ramp_of(a, b) || is_fringe_of(scene, a, b),
                 Relation::Floor => is_floor_of(a, b),
                 Relation::Surface => is_fragment_of(scene, a, b),
+                Relation::Attached => is_attached_to(scene, pieces, a, b),
                 Relation::Inside => is_inside_of(scene, segments, context, a, b),
                 Relation::OtherEnd => is_other_end(scene, segments, context, a, b),
                 Relation::OnePart => is_one_with(scene, segments, context, a, b),
@@ -180,7 +200,22 @@ fn is_fragment_of(scene: &Scene, whole: &Piece, small: &Piece) -> bool {
     }
     let tint = |piece: &Piece| Tint::of(&scene.scan.appearance(&piece.pixels).mean);
     let is_scrap = || small.pixels.len() * 8 < whole.pixels.len() && tint(small).distance(&tint(whole)) < 7.0;
-    small.lowest_m > 0.022 || is_scrap()
+    small.lowest_m > HOVERING_M || is_scrap()
+}
+
+/// Whether `small` sticks out of `whole`, as a handle before a door: it is near it and no higher, and hangs in the air with
+/// nothing under it to stand on, nor is it held.
+fn is_attached_to(scene: &Scene, pieces: &[Piece], whole: &Piece, small: &Piece) -> bool {
+    if small.pixels.len() * 3 > whole.pixels.len() || small.top_m > whole.top_m + 0.005 || small.lowest_m < CLEAR_M {
+        return false;
+    }
+    let carries = |other: &&Piece| {
+        let level = small.lowest_m - 0.03..small.lowest_m + 0.015;
+        ![whole.label, small.label].contains(&other.label) && level.contains(&other.top_m)
+    };
+    let held = || small.pixels.iter().any(|&pixel| scene.grid.neighbours(pixel).any(|near| scene.own[near]));
+    let stands = || pieces.iter().filter(carries).any(|other| other.distance_m(small) < NEAR_M);
+    whole.distance_m(small) < HANDLE_M && !held() && !stands()
 }
 
 /// Whether `inner` is the inside of a hollow thing whose outside is `outer`: partly covered by it, its rim level
@@ -251,8 +286,9 @@ struct Comparison {
 }
 
 fn compare(context: Context, joint: &Evidence, a: &Piece, b: &Piece) -> Option<Comparison> {
-    let one = fit(context, joint, 0.0)?;
-    let (left, right) = (fit(context, &a.evidence, 0.0)?, fit(context, &b.evidence, 0.0)?);
+    let apart = || rayon::join(|| fit(context, &a.evidence, 0.0), || fit(context, &b.evidence, 0.0));
+    let (one, (left, right)) = rayon::join(|| fit(context, joint, 0.0), apart);
+    let (one, left, right) = (one?, left?, right?);
     let penalty = |h: &Hypothesis, evidence: &Evidence| {
         h.minimum.cost + 0.5 * h.minimum.state.len() as f64 * evidence.independent().max(2.0).ln()
     };
@@ -268,6 +304,25 @@ fn compare(context: Context, joint: &Evidence, a: &Piece, b: &Piece) -> Option<C
     })
 }
 
+/// Whether two pieces, which are `whole` together, are two things: two templates explain them well and better than one.
+pub(crate) fn apart_or_together(context: Context, whole: &Piece, a: &Piece, b: &Piece) -> bool {
+    let one = |piece: &Piece| {
+        let best = fit(context, &piece.evidence, piece.lowest_m)?;
+        let parameters = best.minimum.state.len() as f64;
+        let cost = best.minimum.cost + 0.5 * parameters * piece.evidence.independent().max(2.0).ln();
+        Some((cost, best.explained(&piece.evidence)))
+    };
+    let (together, (left, right)) = rayon::join(|| one(whole), || rayon::join(|| one(a), || one(b)));
+    let (Some((together, whole_explained)), Some((left, first)), Some((right, second))) = (together, left, right)
+    else {
+        return false;
+    };
+    let share = (a.evidence.independent() + b.evidence.independent()) / whole.evidence.independent().max(1.0);
+    let explained = |(surface, outline): (f64, f64)| surface > PARTED_SURFACE && outline > PARTED_OUTLINE;
+    let well = whole_explained.0 > ONE_SURFACE && whole_explained.1 > ONE_OUTLINE;
+    !well && explained(first) && explained(second) && left + right + PARTED_GAIN < together * share.max(1.0)
+}
+
 /// The evidence of two pieces as one; without the inner piece's surface if it is the inside of something hollow.
 fn union(scene: &Scene, segments: &Segments, a: &Piece, b: &Piece, hollow: bool) -> Evidence {
     let mut joined = Segments { labels: segments.labels.clone(), count: segments.count, inner: segments.inner.clone() };
@@ -281,7 +336,7 @@ fn union(scene: &Scene, segments: &Segments, a: &Piece, b: &Piece, hollow: bool)
 }
 
 fn fit<'a>(context: Context<'a>, evidence: &Evidence, base_m: f64) -> Option<Hypothesis<'a>> {
-    let base_m = if base_m > 0.022 { base_m } else { 0.0 };
+    let base_m = if base_m > HOVERING_M { base_m } else { 0.0 };
     let plan: Vec<DVec2> = evidence.points.iter().map(|p| p.position.truncate()).collect();
     let height_m = evidence.top_m() - base_m;
     let measured = Measured { plan, height_m, base: Base::At(base_m), seen_by: SeenBy::Depth };

@@ -37,6 +37,7 @@ mod hypotheses;
 mod joins;
 mod measure;
 mod own;
+mod parting;
 mod patches;
 mod raster;
 mod reading;

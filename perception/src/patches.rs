@@ -50,7 +50,7 @@ enum Ground {
 pub(crate) fn find(scene: &Scene, standing: &[bool]) -> Vec<Patch> {
     let Some(surface) = SurfaceTint::measure(scene) else { return Vec::new() };
     let covered = scene.grid.dilate(standing, 4);
-    let ground: Vec<Ground> = (0..scene.grid.len()).map(|i| classify(scene, &surface, &covered, i)).collect();
+    let ground = scene.grid.map(|i| classify(scene, &surface, &covered, i));
     let tinted: Vec<bool> = ground.iter().map(|g| *g == Ground::Tinted).collect();
     let firm = scene.grid.dilate(&scene.grid.erode(&tinted, 1), 1);
     let mask: Vec<bool> = (0..tinted.len()).map(|i| tinted[i] && firm[i]).collect();

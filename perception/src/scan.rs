@@ -48,7 +48,8 @@ impl Tint {
         Tint::new(lab.l as f32, lab.a as f32, lab.b as f32)
     }
     pub fn distance(&self, other: &Tint) -> f32 {
-        (self.a - other.a).hypot(self.b - other.b)
+        // The numbers are small: `hypot` would guard against an overflow that cannot be.
+        ((self.a - other.a).powi(2) + (self.b - other.b).powi(2)).sqrt()
     }
 }
 
@@ -83,7 +84,8 @@ impl Scan {
             return Err((Blindness::Overexposed, depth_fraction));
         }
         let smooth = smooth(grid, &depth, config);
-        let lab = frame.color.chunks_exact(3).map(|p| to_lab([p[0], p[1], p[2]])).collect();
+        let color = &frame.color;
+        let lab = grid.map(|index| to_lab([color[3 * index], color[3 * index + 1], color[3 * index + 2]]));
         Ok(Scan { grid, intrinsics, depth, smooth, lab, depth_fraction })
     }
 
@@ -122,31 +124,27 @@ fn share(color: &[u8], holds: impl Fn(&[u8]) -> bool) -> f64 {
 
 /// Averages each depth with those of its 5x5 neighbours that lie on the same surface; fills lone holes.
 fn smooth(grid: Grid, depth: &[f32], config: &GrounderConfig) -> Vec<f32> {
-    let mut out = vec![0f32; depth.len()];
-    let gate: Vec<f32> = depth.iter().map(|&z| 0.006 + 3.0 * config.depth_sigma_m(f64::from(z)) as f32).collect();
-    for row in 0..grid.height {
+    grid.map(|at| {
+        let (column, row) = (grid.column(at), grid.row(at));
         let rows = row.saturating_sub(2)..=(row + 2).min(grid.height - 1);
-        for column in 0..grid.width {
-            let at = grid.index(column, row);
-            let (from, to) = (column.saturating_sub(2), (column + 2).min(grid.width - 1));
-            let (mut centre, mut gate_m) = (depth[at], gate[at]);
-            if centre == 0.0 {
-                let Some((median, near)) = hole(grid, depth, column, row) else { continue };
-                (centre, gate_m) = (median, near);
-            }
-            let (mut sum, mut count) = (0f32, 0f32);
-            for r in rows.clone() {
-                for &z in &depth[r * grid.width + from..=r * grid.width + to] {
-                    if (z - centre).abs() < gate_m && z > 0.0 {
-                        sum += z;
-                        count += 1.0;
-                    }
-                }
-            }
-            out[at] = if count > 0.0 { sum / count } else { centre };
+        let (from, to) = (column.saturating_sub(2), (column + 2).min(grid.width - 1));
+        let mut centre = depth[at];
+        let mut gate_m = 0.006 + 3.0 * config.depth_sigma_m(f64::from(centre)) as f32;
+        if centre == 0.0 {
+            let Some((median, near)) = hole(grid, depth, column, row) else { return 0.0 };
+            (centre, gate_m) = (median, near);
         }
-    }
-    out
+        let (mut sum, mut count) = (0f32, 0f32);
+        for r in rows {
+            for &z in &depth[r * grid.width + from..=r * grid.width + to] {
+                // Without a branch: what is far counts nothing.
+                let near = if (z - centre).abs() < gate_m && z > 0.0 { 1.0 } else { 0.0 };
+                sum += near * z;
+                count += near;
+            }
+        }
+        if count > 0.0 { sum / count } else { centre }
+    })
 }
 
 /// A depth for a hole whose direct surroundings are mostly measured and of one surface.

@@ -105,7 +105,7 @@ impl<'a> Scene<'a> {
 
     fn find_surface(&mut self) {
         let flat = |i: usize| !self.own[i] && self.is_known(i) && self.point[i].z.abs() <= self.height_limit_m(i);
-        let mask: Vec<bool> = (0..self.grid.len()).map(flat).collect();
+        let mask = self.grid.map(flat);
         // Opened against specks on walls and floors behind, closed over lines of holes.
         let solid = self.grid.dilate(&self.grid.erode(&mask, 1), 3);
         let (labels, sizes) = self.grid.components(&solid, |_, _| true);
@@ -130,7 +130,7 @@ impl<'a> Scene<'a> {
                 && point.z < self.config.max_height_m
                 && self.stands_inside(point.as_dvec3())
         };
-        self.rising = (0..self.grid.len()).map(rises).collect();
+        self.rising = self.grid.map(rises);
     }
 
     /// Whether the foot of a point lies on the surface. Feet that the image does not show get some leave.
@@ -148,26 +148,21 @@ impl<'a> Scene<'a> {
 fn points(scan: &Scan, camera: &Pose, noise_ratio: f32, config: &GrounderConfig) -> (Vec<Vec3>, Vec<f32>) {
     let axes = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| camera.transform_vector(axis).as_vec3());
     let eye = camera.translation.as_vec3();
-    let mut points = Vec::with_capacity(scan.grid.len());
-    let mut sigma_m = Vec::with_capacity(scan.grid.len());
     let intrinsics = scan.intrinsics;
-    for row in 0..scan.grid.height {
-        let y = ((row as f64 - intrinsics.cy) / intrinsics.fy) as f32;
-        let along_row = axes[1] * y + axes[2];
-        for column in 0..scan.grid.width {
-            let depth = scan.smooth[scan.grid.index(column, row)];
-            if depth <= 0.0 {
-                points.push(Vec3::NAN);
-                sigma_m.push(0.0);
-                continue;
-            }
-            let x = ((column as f64 - intrinsics.cx) / intrinsics.fx) as f32;
-            let ray = axes[0] * x + along_row;
-            points.push(eye + ray * depth);
-            sigma_m.push(noise_ratio * config.depth_sigma_m(f64::from(depth)) as f32 * ray.z.abs());
-        }
-    }
-    (points, sigma_m)
+    let ray = |index: usize| {
+        let x = ((scan.grid.column(index) as f64 - intrinsics.cx) / intrinsics.fx) as f32;
+        let y = ((scan.grid.row(index) as f64 - intrinsics.cy) / intrinsics.fy) as f32;
+        axes[0] * x + axes[1] * y + axes[2]
+    };
+    let point = |index: usize| match scan.smooth[index] {
+        depth if depth > 0.0 => eye + ray(index) * depth,
+        _ => Vec3::NAN,
+    };
+    let sigma = |index: usize| match scan.smooth[index] {
+        depth if depth > 0.0 => noise_ratio * config.depth_sigma_m(f64::from(depth)) as f32 * ray(index).z.abs(),
+        _ => 0.0,
+    };
+    (scan.grid.map(point), scan.grid.map(sigma))
 }
 
 /// The convex hull of points, counter-clockwise (Andrew's monotone chain); fewer than three points are returned as
@@ -200,16 +195,38 @@ pub(crate) fn convex_hull(mut points: Vec<DVec2>) -> Vec<DVec2> {
 
 /// How far a point lies outside a convex polygon; negative inside (distance to the nearest edge).
 pub(crate) fn distance_outside(polygon: &[DVec2], point: DVec2) -> f64 {
-    let (mut inside, mut nearest2) = (f64::NEG_INFINITY, f64::INFINITY);
-    for (i, &a) in polygon.iter().enumerate() {
-        let b = polygon[(i + 1) % polygon.len()];
-        let (edge, to) = (b - a, point - a);
-        let length = edge.length().max(1e-12);
-        inside = inside.max(-edge.perp_dot(to) / length);
-        let share = (to.dot(edge) / (length * length)).clamp(0.0, 1.0);
-        nearest2 = nearest2.min((to - edge * share).length_squared());
+    Outline::of(polygon).distance_outside(point)
+}
+
+/// A convex polygon ready to be asked for many distances.
+pub(crate) struct Outline {
+    /// Corner, unit vector to the next corner, and distance to it.
+    edges: Vec<(DVec2, DVec2, f64)>,
+}
+
+impl Outline {
+    /// Of a counter-clockwise polygon.
+    pub fn of(polygon: &[DVec2]) -> Outline {
+        let edge = |(i, &a): (usize, &DVec2)| {
+            let to = polygon[(i + 1) % polygon.len()] - a;
+            let length = to.length().max(1e-12);
+            (a, to / length, length)
+        };
+        Outline { edges: polygon.iter().enumerate().map(edge).collect() }
     }
-    if inside > 0.0 { nearest2.sqrt() } else { inside }
+    /// As [`distance_outside`].
+    pub fn distance_outside(&self, point: DVec2) -> f64 {
+        let across = |(a, along, _): &(DVec2, DVec2, f64)| (point - *a).perp_dot(*along);
+        let inside = self.edges.iter().map(across).fold(f64::NEG_INFINITY, f64::max);
+        if inside <= 0.0 {
+            return inside;
+        }
+        let distance2 = |(a, along, length): &(DVec2, DVec2, f64)| {
+            let to = point - *a;
+            (to - *along * to.dot(*along).clamp(0.0, *length)).length_squared()
+        };
+        self.edges.iter().map(distance2).fold(f64::INFINITY, f64::min).sqrt()
+    }
 }
 
 #[cfg(test)]

@@ -50,7 +50,7 @@ const BEND_STEP: usize = 4;
 pub(crate) fn split(scene: &Scene) -> Segments {
     let normals = normals(scene);
     let jumps = jumps(scene, &normals);
-    let core: Vec<bool> = (0..scene.grid.len()).map(|i| scene.rising[i] && !jumps[i]).collect();
+    let core = scene.grid.map(|i| scene.rising[i] && !jumps[i]);
     let bends = bends(scene, &normals);
     let step_m = |a: usize| 0.004 + 0.008 * scene.scan.smooth[a] + 2.0 * noise_m(scene, a);
     let joined =
@@ -84,9 +84,11 @@ fn normal_reach(scene: &Scene) -> isize {
 fn normals(scene: &Scene) -> Vec<Vec3> {
     let reach = normal_reach(scene);
     let eye = scene.camera.translation.as_vec3();
-    let mut normals = vec![Vec3::ZERO; scene.grid.len()];
     let near = scene.grid.dilate(&scene.rising, 2);
-    for index in (0..scene.grid.len()).filter(|&i| near[i] && scene.is_known(i)) {
+    scene.grid.map(|index| {
+        if !near[index] || !scene.is_known(index) {
+            return Vec3::ZERO;
+        }
         let here = scene.point[index];
         let z = scene.scan.smooth[index];
         let gate = 0.01 + 0.02 * z + 2.0 * noise_m(scene, index);
@@ -100,9 +102,8 @@ fn normals(scene: &Scene) -> Vec<Vec3> {
         let across = reach_to(1, 0).unwrap_or(here) - reach_to(-1, 0).unwrap_or(here);
         let down = reach_to(0, 1).unwrap_or(here) - reach_to(0, -1).unwrap_or(here);
         let normal = across.cross(down).normalize_or_zero();
-        normals[index] = if normal.dot(eye - here) < 0.0 { -normal } else { normal };
-    }
-    normals
+        if normal.dot(eye - here) < 0.0 { -normal } else { normal }
+    })
 }
 
 /// Pixels next to a step in depth that the slope of their own surface does not explain, or next to a hole.
@@ -125,7 +126,7 @@ fn jumps(scene: &Scene, normals: &[Vec3]) -> Vec<bool> {
         let limit = 0.005 + 0.004 * z + 1.3 * expected + 1.5 * noise_m(scene, index);
         beside_hole[index] || high[index] - low[index] > limit
     };
-    (0..scene.grid.len()).map(is_jump).collect()
+    scene.grid.map(is_jump)
 }
 
 /// Pixels at which the surface bends inwards, in a row or in a column.
@@ -152,7 +153,7 @@ fn bends(scene: &Scene, normals: &[Vec3]) -> Vec<bool> {
         let turn = (nb - na).dot(across) / (length + 1e-9);
         turn < -0.3 - 1.5 * (slope_sigma(index) - 0.2).max(0.0) && na.dot(nb) < 0.88 && length < 0.06
     };
-    (0..scene.grid.len()).map(|i| scene.rising[i] && (inwards(i, 1, 0) || inwards(i, 0, 1))).collect()
+    scene.grid.map(|i| scene.rising[i] && (inwards(i, 1, 0) || inwards(i, 0, 1)))
 }
 
 /// Gives unlabelled pixels of standing things to the segment that reaches them first, within `reach_px` steps and

@@ -5,11 +5,16 @@ use glam::DVec3;
 use nalgebra::{Matrix3, Vector3};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
 
 /// Sampling stride over the image, pixels.
 const STRIDE: usize = 4;
 /// Most planes that are scored.
 const MAX_SCORED: usize = 320;
+/// Most of the best that are refined.
+const MAX_REFINED: usize = 12;
+/// Planes whose normals and offsets differ by less are refined to the same one, radians and metres.
+const TWIN: (f64, f64) = (0.01, 0.004);
 /// Most triples that are drawn.
 const MAX_DRAWN: usize = 6000;
 
@@ -48,9 +53,14 @@ pub(crate) fn find(scan: &Scan, excluded: &[bool], upright: Upright, config: &Gr
     let mut candidates = draw(&coarse, upright, config);
     candidates.sort_by_key(|(score, _)| std::cmp::Reverse(*score));
     let (mut best, mut best_size) = (None, 0);
-    for (_, plane) in candidates.into_iter().take(12) {
+    candidates.truncate(MAX_REFINED);
+    drop_twins(&mut candidates);
+    let refine = |(_, plane): (usize, Plane)| {
         let refined = refine(&coarse, plane, upright);
-        let size = coarse.largest_patch(&refined).len();
+        (coarse.largest_patch(&refined).len(), refined)
+    };
+    let refined: Vec<(usize, Plane)> = candidates.into_par_iter().map(refine).collect();
+    for (size, refined) in refined {
         if size > best_size {
             (best, best_size) = (Some(refined), size);
         }
@@ -108,9 +118,9 @@ fn draw(coarse: &Coarse, upright: Upright, config: &GrounderConfig) -> Vec<(usiz
     let count = coarse.points.len();
     let thinning = (count / 3000).max(1);
     let cosine = upright.max_angle_rad.cos();
-    let mut scored = Vec::new();
+    let mut planes = Vec::new();
     for _ in 0..MAX_DRAWN {
-        if scored.len() >= MAX_SCORED {
+        if planes.len() >= MAX_SCORED {
             break;
         }
         let [a, b, c] = [(); 3].map(|()| coarse.points[random.random_range(0..count)]);
@@ -120,11 +130,22 @@ fn draw(coarse: &Coarse, upright: Upright, config: &GrounderConfig) -> Vec<(usiz
         if normal.dot(upright.up) < cosine || spread < 0.03 {
             continue;
         }
-        let plane = Plane { normal, offset: normal.dot(a), residual_m: 0.0, noise_ratio: 1.0 };
-        let score = (0..count).step_by(thinning).filter(|&i| coarse.is_inlier(&plane, i)).count();
-        scored.push((score, plane));
+        planes.push(Plane { normal, offset: normal.dot(a), residual_m: 0.0, noise_ratio: 1.0 });
     }
-    scored
+    let score = |plane: &Plane| (0..count).step_by(thinning).filter(|&i| coarse.is_inlier(plane, i)).count();
+    planes.into_par_iter().with_min_len(16).map(|plane| (score(&plane), plane)).collect()
+}
+
+/// Leaves of planes that are nearly the same the first.
+fn drop_twins(candidates: &mut Vec<(usize, Plane)>) {
+    let twins = |a: &Plane, b: &Plane| a.normal.distance(b.normal) < TWIN.0 && (a.offset - b.offset).abs() < TWIN.1;
+    let mut kept: Vec<(usize, Plane)> = Vec::new();
+    for candidate in candidates.drain(..) {
+        if !kept.iter().any(|other| twins(&other.1, &candidate.1)) {
+            kept.push(candidate);
+        }
+    }
+    *candidates = kept;
 }
 
 /// A few rounds of weighted least squares over the inliers.

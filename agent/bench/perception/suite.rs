@@ -6,11 +6,13 @@
 //! | `thing`, `deviation`, `outline` | things, things that are a little off, how far things are apart |
 //! | `scene`, `view` | a table of things from a seed; what a camera sees of it |
 //! | `labelled` | clouds of such things with what is true of them, for `acm learn` |
+//! | `crowd` | how long frames with many things take |
 //! | `score`, `tally` | one answer against the truth; the figures of many |
 //!
-//! Perception gets the noisy frame, the nominal calibration and an empty expectation, and of the second frame what
+//! Perception gets the noisy frame, the nominal calibration and an empty expectation; of the second frame of a crowd what
 //! memory expects after the first. The truth stays here.
 
+pub mod crowd;
 mod deviation;
 #[cfg(feature = "learned")]
 pub mod labelled;
@@ -25,20 +27,14 @@ mod tests;
 mod thing;
 mod view;
 
-use super::timed;
 use crate::{
     bench::{
         BenchResult, Row, progress,
         targets::{Targets, Verdict},
     },
     cli::PerceptionArgs,
-    perceive::no_robot,
 };
-use acm_concept::{expectation::Expectation, object::Percepts, template::TemplateLibrary};
-use acm_memory::{
-    AcmMemory, Memory,
-    observation::{Note, Observation},
-};
+use acm_concept::{expectation::Expectation, template::TemplateLibrary};
 use acm_perception::{Grounder, GrounderConfig};
 use acm_render::Renderer;
 use anyhow::{Context, bail};
@@ -161,7 +157,7 @@ impl Bench {
         let library = Arc::new(acm_memory::default_library()?);
         let mut plan = Plan::own(&library)?;
         if let Some(first) = args.seed_from {
-            (plan.first_seed, plan.small_cubes.first_seed) = (first, first);
+            (plan.first_seed, plan.small_cubes.first_seed, plan.crowd.first_seed) = (first, first, first);
         }
         let renderer = match Renderer::new() {
             Ok(renderer) => renderer,
@@ -181,13 +177,8 @@ impl Bench {
 
     fn play(&mut self, wanted: Wanted, seed: u64) -> anyhow::Result<Tally> {
         let (scene, view) = draw(&self.plan, &self.library, &mut self.foreign, &mut self.eye, wanted, seed)?;
-        let [first, second] = &view.frames;
-        let (percepts, new_ms) = timed(&self.grounder, first, &Expectation::default());
-        let expectation = self.remember(&view, &percepts)?;
-        let (_, known_ms) = timed(&self.grounder, second, &expectation);
-        let mut scored = score::score(&scene, &view.labels, &percepts, &self.library);
-        scored.tally.new_ms.push(new_ms);
-        scored.tally.known_ms.push(known_ms);
+        let percepts = self.grounder.ground(&view.frames[0], &Expectation::default());
+        let scored = score::score(&scene, &view.labels, &percepts, &self.library);
         if let Some(folder) = &self.pictures {
             let path = folder.join(format!("{}-{seed:04}.png", wanted.kind.name().replace(' ', "-")));
             picture::draw(&view, &percepts, &scored.fates, &self.library)
@@ -210,15 +201,6 @@ impl Bench {
                 .with_context(cannot)?;
         }
         Ok(())
-    }
-
-    /// What a fresh memory that took the first frame expects of the second.
-    fn remember(&self, view: &View, percepts: &Percepts) -> anyhow::Result<Expectation> {
-        let [first, second] = &view.frames;
-        let mut memory = AcmMemory::in_memory(Arc::clone(&self.library));
-        memory.note(&Note::EpisodeBegan)?;
-        memory.observe(&Observation { percepts, frame: first, feedback: &no_robot(&first.header) })?;
-        Ok(memory.expect(second.header.time))
     }
 }
 

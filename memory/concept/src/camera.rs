@@ -45,10 +45,12 @@ impl Intrinsics {
         }
     }
     /// The direction of a pixel's ray in the camera frame, scaled so that its z is 1.
+    #[inline]
     pub fn ray(&self, column: f64, row: f64) -> DVec3 {
         DVec3::new((column - self.cx) / self.fx, (row - self.cy) / self.fy, 1.0)
     }
     /// Image coordinates of a point of the camera frame, or `None` if it lies behind the camera.
+    #[inline]
     pub fn project(&self, point: DVec3) -> Option<DVec2> {
         (point.z > 1e-6)
             .then(|| DVec2::new(self.fx * point.x / point.z + self.cx, self.fy * point.y / point.z + self.cy))

@@ -38,15 +38,18 @@ impl Pose {
         Pose { translation, rotation: DQuat::from_rotation_z(yaw) }
     }
     /// The motion that undoes this one.
+    #[inline]
     pub fn inverse(&self) -> Pose {
         let rotation = self.rotation.inverse();
         Pose { translation: -(rotation * self.translation), rotation }
     }
     /// A point of this frame expressed in the parent.
+    #[inline]
     pub fn transform_point(&self, point: DVec3) -> DVec3 {
         self.rotation * point + self.translation
     }
     /// A direction of this frame expressed in the parent.
+    #[inline]
     pub fn transform_vector(&self, vector: DVec3) -> DVec3 {
         self.rotation * vector
     }

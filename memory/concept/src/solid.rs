@@ -91,6 +91,7 @@ impl Solid {
     /// assert!((cube.signed_distance(DVec3::new(0.05, 0.0, 0.0)) - 0.03).abs() < 1e-12);
     /// assert!((cube.signed_distance(DVec3::ZERO) + 0.02).abs() < 1e-12);
     /// ```
+    #[inline]
     pub fn signed_distance(&self, point: DVec3) -> f64 {
         match *self {
             Solid::Box { size } => {
@@ -216,6 +217,7 @@ pub struct PlacedSolid {
 
 impl PlacedSolid {
     /// Signed distance from a point of the parent frame, negative inside. Metres.
+    #[inline]
     pub fn signed_distance(&self, point: DVec3) -> f64 {
         self.solid.signed_distance(self.pose.inverse().transform_point(point))
     }

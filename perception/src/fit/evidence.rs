@@ -69,6 +69,17 @@ const EDGE_DOUBT: f64 = 3.0;
 const HOLE_REACH: usize = 32;
 
 impl Evidence {
+    /// Every so many-th point and outline point, each of which counts for as many: enough for a rough fit.
+    pub fn thinned(&self, every: usize) -> Evidence {
+        let count = every as f64;
+        Evidence {
+            points: self.points.iter().step_by(every).copied().collect(),
+            point_weight: count * self.point_weight,
+            outline: self.outline.iter().step_by(every).copied().collect(),
+            outline_weight: count * self.outline_weight,
+            ..*self
+        }
+    }
     /// The evidence of a segment of standing pixels.
     pub fn of_segment(scene: &Scene, segments: &Segments, pixels: &[usize]) -> Evidence {
         let noise = (1.3 * scene.noise_ratio).clamp(0.4, 1.2);

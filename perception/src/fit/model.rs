@@ -1,13 +1,13 @@
 //! A template as a function from a state vector to residuals against evidence.
 
 use super::evidence::{Evidence, OutlineKind};
-use crate::scene::{convex_hull, distance_outside};
+use crate::scene::{Outline, convex_hull};
 use acm_concept::{
     pose::Pose,
     solid::{PlacedSolid, Solid},
     template::{Rest, Template, YawSymmetry},
 };
-use glam::{DVec2, DVec3};
+use glam::{DAffine3, DVec2, DVec3};
 
 /// What the part stands on.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -151,18 +151,19 @@ impl<'a> Model<'a> {
     pub fn residuals(&self, state: &[f64], evidence: &Evidence, residuals: &mut Vec<f64>) {
         residuals.clear();
         let solids = self.solids(state);
-        let local: Vec<(Pose, Solid)> = solids.iter().map(|s| (s.pose.inverse(), s.solid)).collect();
+        let local: Vec<(DAffine3, Solid)> = solids.iter().map(|s| (affine(&s.pose.inverse()), s.solid)).collect();
         for point in &evidence.points {
             let distance =
-                |(inverse, solid): &(Pose, Solid)| solid.signed_distance(inverse.transform_point(point.position));
+                |(inverse, solid): &(DAffine3, Solid)| solid.signed_distance(inverse.transform_point3(point.position));
             let nearest = local.iter().map(distance).fold(f64::INFINITY, f64::min);
             residuals.push(if nearest.is_finite() { nearest / point.sigma_m } else { 1e3 });
         }
         let to_camera = evidence.camera.inverse();
-        let outlines: Vec<Vec<DVec2>> = solids.iter().flat_map(|s| image_outlines(s, &to_camera, evidence)).collect();
+        let polygons = solids.iter().flat_map(|s| image_outlines(s, &to_camera, evidence));
+        let outlines: Vec<Outline> = polygons.filter(|polygon| polygon.len() > 2).map(|p| Outline::of(&p)).collect();
         for point in &evidence.outline {
-            let distance = |outline: &Vec<DVec2>| distance_outside(outline, point.pixel);
-            let outside = outlines.iter().filter(|o| o.len() > 2).map(distance).fold(f64::INFINITY, f64::min);
+            let distance = |outline: &Outline| outline.distance_outside(point.pixel);
+            let outside = outlines.iter().map(distance).fold(f64::INFINITY, f64::min);
             let outside = if outside.is_finite() { outside } else { 1e3 };
             let outside = if point.kind == OutlineKind::Own { outside } else { outside.max(0.0) };
             residuals.push(outside / point.sigma_px);
@@ -170,11 +171,16 @@ impl<'a> Model<'a> {
     }
 }
 
+/// A pose as a matrix, which moves many points faster.
+fn affine(pose: &Pose) -> DAffine3 {
+    DAffine3::from_rotation_translation(pose.rotation, pose.translation)
+}
+
 /// The outlines in the image of the convex pieces of a solid: together they cover what it does. The mouth of a vessel is
 /// covered as well; behind it lies the vessel's own inside.
 fn image_outlines(solid: &PlacedSolid, to_camera: &Pose, evidence: &Evidence) -> Vec<Vec<DVec2>> {
-    let pose = *to_camera * solid.pose;
-    let project = |corner: DVec3| evidence.intrinsics.project(pose.transform_point(corner));
+    let pose = affine(&(*to_camera * solid.pose));
+    let project = |corner: DVec3| evidence.intrinsics.project(pose.transform_point3(corner));
     let pieces = corners(&solid.solid);
     let pieces = if matches!(solid.solid, Solid::Ellipsoid { .. }) { vec![pieces.concat()] } else { pieces };
     pieces.into_iter().map(|piece| convex_hull(piece.into_iter().filter_map(project).collect())).collect()
@@ -217,6 +223,7 @@ fn slice(edge: [DVec2; 2]) -> Vec<DVec3> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::distance_outside;
     use acm_concept::camera::Intrinsics;
     use glam::DQuat;
     use proptest::prelude::*;

@@ -5,7 +5,7 @@ use crate::{
     expected::Remembered,
     fit::Evidence,
     hypotheses::Context,
-    joins,
+    joins, parting,
     scene::Scene,
     segments::{self, NONE, Segments},
     tools::{Mask, ParamBelief, PoseBelief},
@@ -115,7 +115,9 @@ impl Grounder {
         crate::expected::split(scene, remembered, &mut segments);
         crate::expected::merge(remembered, &mut segments);
         // What is hollow or cut in two is told by upright solids alone: they are many, and most are refused.
-        joins::join(scene, &mut segments, Context { lying: false, displaced: &[], ..unremembered });
+        let upright = Context { lying: false, displaced: &[], ..unremembered };
+        joins::join(scene, &mut segments, upright);
+        parting::part(scene, &mut segments, upright);
         segments
     }
 }

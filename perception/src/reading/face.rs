@@ -10,9 +10,9 @@ use rand_chacha::ChaCha8Rng;
 /// Faces of one thing that are looked for: a box shows three.
 const MAX_FACES: usize = 3;
 /// Points that planes are drawn from and judged by.
-const SAMPLES: usize = 360;
+const SAMPLES: usize = 240;
 /// Triples that are drawn for a face.
-const DRAWS: usize = 40;
+const DRAWS: usize = 30;
 /// Fewer pixels are no face that could be read.
 const LEAST_PX: usize = 100;
 /// A face is no smaller a share of what is left of the thing.

@@ -94,8 +94,12 @@ pub(super) fn spots(scan: &Scan, face: &Face, mask: &[bool]) -> Option<Drawing> 
         return None;
     }
     // The dark segments of a display.
-    let ghosts: Vec<bool> =
-        spots.iter().map(|spot| spots.iter().any(|other| is_ghost(grid, spot, other, ground))).collect();
+    let extents: Vec<[usize; 4]> = spots.iter().map(|spot| extent(grid, spot)).collect();
+    let ghost = |at: usize| {
+        let others = spots.iter().zip(&extents);
+        others.into_iter().any(|(other, around)| is_ghost((&spots[at], extents[at]), (other, *around), ground))
+    };
+    let ghosts: Vec<bool> = (0..spots.len()).map(ghost).collect();
     if ghosts.contains(&true) {
         let mut names = Vec::new();
         let mut kept = Vec::new();
@@ -115,12 +119,11 @@ pub(super) fn spots(scan: &Scan, face: &Face, mask: &[bool]) -> Option<Drawing> 
 
 /// Whether a spot is a faint copy of what is beside it: its colour lies less than half way to the other's, and it is
 /// smaller or as near as the segments of one digit are.
-fn is_ghost(grid: Grid, spot: &Spot, other: &Spot, ground: [f32; 3]) -> bool {
+fn is_ghost((spot, a): (&Spot, [usize; 4]), (other, b): (&Spot, [usize; 4]), ground: [f32; 3]) -> bool {
     let way = share(spot.color, ground, other.color);
     if way > 0.5 || !is_between(spot.color, ground, other.color) {
         return false;
     }
-    let (a, b) = (extent(grid, spot), extent(grid, other));
     let size = |[left, top, right, bottom]: [usize; 4]| (right - left).max(bottom - top) + 1;
     let gap = |k: usize| a[k].saturating_sub(b[k + 2]).max(b[k].saturating_sub(a[k + 2]));
     gap(0).max(gap(1)) <= size(a).max(size(b))

@@ -153,8 +153,15 @@ fn what_is_no_writing_gives_no_reading() {
 
 #[test]
 fn small_digits_are_said_to_be_too_small() {
-    let rows =
-        ["#...#.#...#", "#...#.#...#", "#...#.#...#", "#####.#####", "....#.....#", "....#.....#", "....#.....#"];
+    let rows = [
+        "#...#...#...#",
+        "#...#...#...#",
+        "#...#...#...#",
+        "#####...#####",
+        "....#.......#",
+        "....#.......#",
+        "....#.......#",
+    ];
     let readings = read_face(picture(&rows, (30, 30), 1, [20, 20, 30]));
     assert_eq!(texts(&readings), Vec::<&str>::new());
     let small = |reading: &Reading| reading.content == Content::Unreadable { reason: Unreadable::TooSmall };

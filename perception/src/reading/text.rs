@@ -13,6 +13,8 @@ use glam::DVec2;
 /// Marks of fewer pixels in height are too small to be read, and of fewer still not even seen as marks.
 const LEAST_HEIGHT_PX: f64 = 9.0;
 const LEAST_MARK_PX: f64 = 5.0;
+/// Larger than this, a mark is a thing's own shape.
+const MOST_MARK_PX: f64 = 200.0;
 /// Strokes of one mark, such as the segments of a digit, are no farther apart than this share of their width and this
 /// many pixels.
 const GAP_OF_STROKE: f64 = 0.5;
@@ -234,7 +236,7 @@ fn mark(
     let scale = DVec2::new(face.pixels_per_metre(middle, right), face.pixels_per_metre(middle, up));
     let size_px = (high - low) * scale;
     let longer = size_px.max_element();
-    if longer < LEAST_MARK_PX || longer > 200.0 {
+    if !(LEAST_MARK_PX..=MOST_MARK_PX).contains(&longer) {
         return None;
     }
     let margin = 1.6 / scale.min_element().max(1.0);
@@ -320,7 +322,7 @@ impl Mark {
         high - low
     }
     fn height_px(&self, quarter: u8) -> f64 {
-        self.size(quarter).y * if quarter % 2 == 0 { self.scale.y } else { self.scale.x }
+        self.size(quarter).y * if quarter.is_multiple_of(2) { self.scale.y } else { self.scale.x }
     }
     /// Whether a bar that stands alone may be a mark: thin, and short on its ground, unlike a slot or a blank label.
     fn is_lone_bar(&self, ways: Ways) -> bool {
@@ -337,8 +339,12 @@ impl Mark {
 
 /// Lays marks in lines one way up; the score says how well they read so.
 fn arrange(marks: &[Mark], reads: &[Option<Read>], quarter: u8, ways: Ways) -> (f32, Vec<Line>) {
-    let plausible =
-        |at: usize| marks[at].cut || reads[at].as_ref().is_some_and(|read| read.matches[0].distance < glyph::FARTHEST);
+    let plausible = |at: usize| {
+        // What is too small to be read may look like much else.
+        let small = marks[at].longer_px() < LEAST_HEIGHT_PX;
+        let most = if small { 2.0 * glyph::FARTHEST } else { glyph::FARTHEST };
+        marks[at].cut || reads[at].as_ref().is_some_and(|read| read.matches[0].distance < most)
+    };
     let mut order: Vec<usize> = (0..marks.len()).filter(|&at| plausible(at)).collect();
     order.sort_by(|&a, &b| marks[a].corners(quarter).0.x.total_cmp(&marks[b].corners(quarter).0.x));
     let mut rows: Vec<Vec<usize>> = Vec::new();

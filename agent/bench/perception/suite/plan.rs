@@ -42,6 +42,8 @@ pub struct Plan {
     pub foreign: ForeignPlan,
     /// The cubes in small frames.
     pub small_cubes: SmallCubesPlan,
+    /// Many things in one frame.
+    pub crowd: CrowdPlan,
 }
 
 /// A row of the suite.
@@ -201,7 +203,31 @@ pub struct SmallCubesPlan {
     pub least_pixels: usize,
 }
 
+/// Many things in one frame.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CrowdPlan {
+    /// Scenes.
+    pub scenes: usize,
+    /// Seed of the first.
+    pub first_seed: u64,
+    /// Things of a scene.
+    pub count: usize,
+    /// Largest extent of a thing, metres.
+    pub largest_m: Range<f64>,
+    /// Of the camera from the middle of the things, metres.
+    pub distance_m: f64,
+}
+
 impl Plan {
+    /// The same with the layout of a crowd.
+    pub fn crowded(&self) -> Plan {
+        let crowd = &self.crowd;
+        let layout = LayoutPlan { count: [crowd.count; 2], largest_m: crowd.largest_m, ..self.layout.clone() };
+        let camera = CameraPlan { distance_m: [crowd.distance_m; 2], ..self.camera.clone() };
+        Plan { layout, camera, ..self.clone() }
+    }
+
     /// The suite that ships.
     ///
     /// # Errors
@@ -232,6 +258,8 @@ impl Plan {
             ("perturbation.dent_m", self.perturbation.dent_m),
             ("perturbation.dent_radius_m", self.perturbation.dent_radius_m),
             ("foreign.largest_m", self.foreign.largest_m),
+            ("crowd.largest_m", self.crowd.largest_m),
+            ("crowd.distance_m", [self.crowd.distance_m; 2]),
         ];
         for (field, [least, most]) in ranges {
             ensure!(
@@ -239,7 +267,11 @@ impl Plan {
                 "{field}: [{least}, {most}] is no positive range"
             );
         }
-        let counts = [("layout.count", self.layout.count), ("small_cubes.count", self.small_cubes.count)];
+        let counts = [
+            ("layout.count", self.layout.count),
+            ("small_cubes.count", self.small_cubes.count),
+            ("crowd.count", [self.crowd.count; 2]),
+        ];
         for (field, [least, most]) in counts {
             ensure!(least > 0 && least <= most && most <= 32, "{field}: [{least}, {most}] is no range from 1 to 32");
         }

@@ -73,10 +73,6 @@ pub struct Tally {
     pub unseen: usize,
     /// Angles of hinges that are right, of the things that were found.
     pub opening: Share,
-    /// Time of a frame of which nothing is known.
-    pub new_ms: Vec<f64>,
-    /// Time of a frame that memory expects.
-    pub known_ms: Vec<f64>,
     /// What became of the things.
     pub fates: BTreeMap<Fate, usize>,
     /// Found and true places of the scene at hand.
@@ -110,8 +106,6 @@ impl Tally {
             (&mut self.part_iou, &other.part_iou),
             (&mut self.world_part_iou, &other.world_part_iou),
             (&mut self.interval_mm, &other.interval_mm),
-            (&mut self.new_ms, &other.new_ms),
-            (&mut self.known_ms, &other.known_ms),
         ];
         lists.into_iter().for_each(|(own, other)| own.extend(other));
         for (fate, count) in &other.fates {
@@ -144,8 +138,6 @@ impl Tally {
             ("interval90_coverage", or_none(self.interval.value(), self.templated)),
             ("interval_width_over_median_error", width),
             ("opening_angle_within_5deg", or_none(self.opening.value(), self.hinges)),
-            ("frame_new_ms", median(&self.new_ms)),
-            ("frame_known_ms", median(&self.known_ms)),
         ];
         figures.into_iter().filter_map(|(name, value)| Some((name, value?))).collect()
     }

@@ -1,0 +1,65 @@
+//! How long a frame with many things takes: one that memory explains, and one in which two of them are new.
+
+use super::{Bench, draw, plan::RowKind, progress, quick, scene::Wanted};
+use crate::{
+    bench::{BenchResult, Row, perception::timed},
+    cli::PerceptionArgs,
+    perceive::no_robot,
+    statistics::median_and,
+};
+use acm_concept::expectation::Expectation;
+use acm_memory::{
+    AcmMemory, Memory,
+    observation::{Note, Observation},
+};
+use std::sync::Arc;
+
+/// Things that memory does not know yet in the second of the two figures.
+const NEW: usize = 2;
+
+/// Measures both, and what the first sight of everything takes. Milliseconds, medians over the scenes.
+pub fn measure(args: &PerceptionArgs, result: &mut BenchResult) -> anyhow::Result<()> {
+    let Some(mut bench) = Bench::new(args, result)? else { return Ok(()) };
+    bench.plan = bench.plan.crowded();
+    let count = quick(args, args.common.episodes.unwrap_or(bench.plan.crowd.scenes).min(bench.plan.crowd.scenes));
+    let bar = progress("crowd", count as u64);
+    let (mut first, mut known, mut new, mut things) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    for seed in (bench.plan.crowd.first_seed..).take(count) {
+        let wanted = Wanted { kind: RowKind::Exact, touching: false };
+        let (_, view) = draw(&bench.plan, &bench.library, &mut bench.foreign, &mut bench.eye, wanted, seed)?;
+        let [before, now] = &view.frames;
+        let (percepts, first_ms) = timed(&bench.grounder, before, &Expectation::default());
+        let mut memory = AcmMemory::in_memory(Arc::clone(&bench.library));
+        memory.note(&Note::EpisodeBegan)?;
+        let feedback = no_robot(&before.header);
+        memory.observe(&Observation { percepts: &percepts, frame: before, feedback: &feedback })?;
+        let expectation = memory.expect(now.header.time);
+        let mut fewer = expectation.clone();
+        fewer.objects.truncate(expectation.objects.len().saturating_sub(NEW));
+        first.push(first_ms);
+        known.push(timed(&bench.grounder, now, &expectation).1);
+        new.push(timed(&bench.grounder, now, &fewer).1);
+        things.push(expectation.objects.len() as f64);
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    if known.is_empty() {
+        result.rows.push(Row::skipped("crowd", "none of its scenes was asked for"));
+        return Ok(());
+    }
+    let figures = [
+        ("frame_known_ms", median_and(0.9, &known)),
+        ("frame_new_ms", median_and(0.9, &new)),
+        ("first_sight_ms", median_and(0.9, &first)),
+        ("things", median_and(0.9, &things)),
+    ];
+    for (name, (median, _)) in &figures[..2] {
+        result.figure(name, *median);
+    }
+    result.rows.push(Row::new("crowd", figures.map(|(name, (median, _))| (name, median)).to_vec()));
+    result.rows.push(Row {
+        group: Some("p90".into()),
+        ..Row::new("crowd", figures.map(|(name, (_, p90))| (name, p90)).to_vec())
+    });
+    Ok(())
+}
