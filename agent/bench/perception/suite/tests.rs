@@ -7,7 +7,7 @@ use super::{
 use acm_concept::{
     camera::CameraModel,
     color::{Appearance, Lab},
-    object::{GroundedObject, GroundedPart, Observability, ParameterEstimate, PixelSupport, PoseEstimate},
+    object::{GroundedObject, GroundedPart, Observability, ParameterEstimate, Percepts, PixelSupport, PoseEstimate},
     pose::Pose,
     solid::PlacedSolid,
 };
