@@ -2,9 +2,11 @@
 //!
 //! | module | measures |
 //! |---|---|
+//! | [`reading`] | digits, marks, lamps and needles on rendered things |
 //! | [`real_frames`] | segmentation of labelled frames of a real camera |
 //! | [`suite`] | the fixed rendered suite: things found, their templates, sizes, places; time of frames with many things |
 
+pub mod reading;
 pub mod real_frames;
 pub mod suite;
 
@@ -26,6 +28,8 @@ pub enum PerceptionPart {
     SmallCubes,
     /// Time of frames with ten things.
     Crowd,
+    /// Digits, marks, lamps and needles.
+    Reading,
 }
 
 /// Measures the parts that are asked for, or everything.
@@ -41,6 +45,7 @@ pub fn measure(args: &PerceptionArgs, targets: &Targets) -> anyhow::Result<Bench
             PerceptionPart::Suite => suite::measure(args, targets, &mut result),
             PerceptionPart::SmallCubes => suite::measure_small_cubes(args, &mut result),
             PerceptionPart::Crowd => suite::crowd::measure(args, &mut result),
+            PerceptionPart::Reading => reading::measure(args, &mut result),
         };
         // What the other parts have measured is not lost with it.
         if let Err(error) = measured {

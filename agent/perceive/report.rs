@@ -8,6 +8,7 @@ use acm_concept::{
         Blindness, GroundedObject, GroundedPart, Observability, ParameterEstimate, Percepts, SupportPlane, Visibility,
     },
     pose::Pose,
+    reading::Reading,
     template::{TemplateLibrary, Unit},
 };
 use acm_memory::{
@@ -89,6 +90,8 @@ pub struct SeenObject {
     pub confidence: f64,
     /// Whether something cuts its outline off.
     pub truncated: bool,
+    /// What is written or shown on it.
+    pub readings: Vec<Reading>,
     /// Its value in the label image.
     pub label: u16,
     /// Number of its pixels.
@@ -231,6 +234,9 @@ impl FrameReport {
         for object in &self.objects {
             let id = object.id.map_or_else(|| "-".into(), |id| id.to_string());
             writeln!(out, "  {id:<4} {:<9} {}", object.status.word(), object.line(library))?;
+            for reading in &object.readings {
+                writeln!(out, "  {:<14} reads {reading} at {}", "", place(&Pose::from_translation(reading.position)))?;
+            }
         }
         for object in &self.absent {
             let last = object.last_pose.map_or_else(String::new, |pose| format!(" last at {}", place(&pose)));
@@ -285,6 +291,7 @@ fn seen(index: usize, object: &GroundedObject, resolved: Option<&Resolved>, memo
         appearance: object.appearance,
         confidence: object.confidence,
         truncated: object.truncated,
+        readings: object.readings.clone(),
         label: u16::try_from(index + 1).unwrap_or(u16::MAX),
         pixels: object.support.count,
         bounds: object.support.bounds,

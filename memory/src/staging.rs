@@ -136,6 +136,7 @@ impl Thing {
             confidence: self.confidence,
             truncated: self.truncated,
             expected: self.expected,
+            readings: Vec::new(),
         }
     }
 }

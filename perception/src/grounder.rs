@@ -16,7 +16,7 @@ use crate::{
     fit::{Base, Evidence},
     frozen::LastPictures,
     hypotheses::{self, Context, Hypothesis, Measured},
-    own, patches,
+    own, patches, reading,
     scan::Scan,
     scene::Scene,
     segments::NONE,
@@ -87,6 +87,10 @@ impl Grounder {
             objects.sort_by(|a, b| b.support.count.cmp(&a.support.count).then(a.support.runs.cmp(&b.support.runs)));
             objects.truncate(self.config.max_objects);
             expected::hint(&remembered, &mut objects, &self.library);
+            let white = reading::white(scene);
+            for object in &mut objects {
+                object.readings = reading::read(scene, white, &object.support);
+            }
             Percepts {
                 frame: frame.header.clone(),
                 support: Some(*support),

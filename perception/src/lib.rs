@@ -12,6 +12,7 @@
 //! | `scan`, `support`, `scene`, `own` | pixels to points, the plane and its extent, heights, the robot's own pixels |
 //! | `segments`, `joins`, `patches` | what stands on the plane, what lies in it |
 //! | `measure`, `fit`, `hypotheses` | first guesses, template fits, the choice among templates |
+//! | `reading` | digits, marks, lamps and needles on things |
 //! | [`given`] | first guess and fit of things whose pixels are given |
 //! | `expected`, `raster` | the comparison with memory's expectation, ray-cast |
 //! | [`tools`] | tools that help: traits, the geometric default, what every implementation must pass |
@@ -40,6 +41,7 @@ mod own;
 mod parting;
 mod patches;
 mod raster;
+mod reading;
 mod scan;
 mod scene;
 mod segments;

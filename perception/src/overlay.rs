@@ -42,7 +42,8 @@ pub fn draw(frame: &RgbdFrame, percepts: &Percepts, names: &[Option<String>], li
     let mut taken: Vec<[i64; 4]> = Vec::new();
     for (index, object) in percepts.objects.iter().enumerate() {
         let name = names.get(index).cloned().flatten().unwrap_or_else(|| format!("#{index}"));
-        let lines = [format!("{name} {}", object.category), size_text(object, library)];
+        let mut lines = vec![format!("{name} {}", object.category), size_text(object, library)];
+        lines.extend(object.readings.iter().take(MAX_READINGS).map(ToString::to_string));
         let place = place_of(&image, &lines, boxes[index], &boxes, &taken);
         caption(&mut image, place, &lines, boxes[index], PALETTE[index % PALETTE.len()]);
         taken.push(place);
@@ -76,6 +77,9 @@ pub fn note(image: &mut RgbImage, lines: &[String]) {
         font.write(image, 2 * font.scale, at, text, Rgb([255, 255, 255]));
     }
 }
+
+/// Most readings of an object that its caption tells.
+const MAX_READINGS: usize = 4;
 
 /// Pixels a dot: 1 up to 960 columns, 2 for full HD.
 fn scale(image: &RgbImage) -> i64 {

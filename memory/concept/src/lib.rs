@@ -9,6 +9,7 @@
 //! | [`ids`], [`time`], [`pose`], [`color`] | readable ids, virtual time, rigid motions, appearance |
 //! | [`solid`], [`mesh`], [`expression`], [`template`] | solids and their triangles, expressions over parameters, the template library |
 //! | [`object`] | grounded parts and objects as perception reports them |
+//! | [`reading`] | marks, lamps and needles as they are read from pixels |
 //! | [`literal`] | state literals and three-valued truth |
 //! | [`camera`], [`plane`] | frames and their pixels, calibration |
 //! | [`embodiment`], [`arm`] | what a real arm takes and reports, its joints and limits; the traits of the outside world |
@@ -32,6 +33,7 @@ pub mod object;
 pub mod plane;
 pub mod pose;
 pub mod primitive;
+pub mod reading;
 pub mod skill;
 pub mod solid;
 pub mod suggest;

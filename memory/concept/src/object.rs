@@ -1,6 +1,6 @@
 //! Grounded parts and objects: what perception reports of a frame, before memory gives identities.
 
-use crate::{camera::FrameHeader, color::Appearance, ids::ObjectId, pose::Pose};
+use crate::{camera::FrameHeader, color::Appearance, ids::ObjectId, pose::Pose, reading::Reading};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -156,6 +156,9 @@ pub struct GroundedObject {
     pub truncated: bool,
     /// The expected object whose predicted appearance explained these pixels, as a hint for identity.
     pub expected: Option<ObjectId>,
+    /// What is written or shown on it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub readings: Vec<Reading>,
 }
 
 impl GroundedObject {

@@ -52,6 +52,7 @@ pub(super) fn object(
         confidence: (certainty * explained * (1.0 - (-(pixels.len() as f64) / 150.0).exp())).clamp(0.0, 1.0),
         truncated: evidence.cut_share() > CUT_SHARE,
         expected: None,
+        readings: Vec::new(),
         support,
     })
 }

@@ -50,6 +50,7 @@ fn picture(width: u32) -> (RgbImage, [i64; 2], [i64; 2]) {
         confidence: 1.0,
         truncated: false,
         expected: None,
+        readings: Vec::new(),
     };
     let percepts = Percepts {
         frame: header,

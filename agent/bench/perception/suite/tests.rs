@@ -112,6 +112,7 @@ impl Case {
             confidence: 1.0,
             truncated: false,
             expected: None,
+            readings: Vec::new(),
         }
     }
 }
