@@ -5,7 +5,9 @@
 //! | [`reading`] | digits, marks, lamps and needles on rendered things |
 //! | [`real_frames`] | segmentation of labelled frames of a real camera |
 //! | [`suite`] | the fixed rendered suite: things found, their templates, sizes, places; time of frames with many things |
+//! | [`articulation`] | joints of articulated things that are seen in two states |
 
+pub mod articulation;
 pub mod reading;
 pub mod real_frames;
 pub mod suite;
@@ -30,6 +32,8 @@ pub enum PerceptionPart {
     Crowd,
     /// Digits, marks, lamps and needles.
     Reading,
+    /// Joints of articulated things of the shared data, each seen in two states.
+    Articulation,
 }
 
 /// Measures the parts that are asked for, or everything.
@@ -46,6 +50,7 @@ pub fn measure(args: &PerceptionArgs, targets: &Targets) -> anyhow::Result<Bench
             PerceptionPart::SmallCubes => suite::measure_small_cubes(args, &mut result),
             PerceptionPart::Crowd => suite::crowd::measure(args, &mut result),
             PerceptionPart::Reading => reading::measure(args, &mut result),
+            PerceptionPart::Articulation => articulation::measure(args, &mut result),
         };
         // What the other parts have measured is not lost with it.
         if let Err(error) = measured {

@@ -87,9 +87,11 @@ impl Grounder {
             objects.sort_by(|a, b| b.support.count.cmp(&a.support.count).then(a.support.runs.cmp(&b.support.runs)));
             objects.truncate(self.config.max_objects);
             expected::hint(&remembered, &mut objects, &self.library);
-            let white = reading::white(scene);
-            for object in &mut objects {
-                object.readings = reading::read(scene, white, &object.support);
+            if self.config.read {
+                let white = reading::white(scene);
+                objects
+                    .par_iter_mut()
+                    .for_each(|object| object.readings = reading::read(scene, white, &object.support));
             }
             Percepts {
                 frame: frame.header.clone(),

@@ -15,11 +15,13 @@
 //! | `reading` | digits, marks, lamps and needles on things |
 //! | [`given`] | first guess and fit of things whose pixels are given |
 //! | `expected`, `raster` | the comparison with memory's expectation, ray-cast |
+//! | [`articulation`] | joints of parts that moved between two frames |
 //! | [`tools`] | tools that help: traits, the geometric default, what every implementation must pass |
 //! | [`overlay`], [`labels`], [`metrics`] | pictures for a person, label images, segmentation scores |
 //!
 //! [`Blindness`]: acm_concept::object::Blindness
 
+pub mod articulation;
 pub mod config;
 pub mod frames;
 pub mod given;

@@ -14,7 +14,7 @@
 //! | `oracle`, `state` | the judge and its variables |
 //! | `audit` | whether whatever happened had a cause |
 //! | `snapshot` | all of it as bytes, and back |
-//! | `surfaces` | what a foreign object looks like, without a world |
+//! | `surfaces`, `mechanism` | what a foreign object looks like, without a world; with its joints anywhere |
 //! | `episode`, `scene`, `texture`, `truth`, `report` | the handles, the picture, the truth, what is reported |
 //!
 //! Conventions: metres, seconds, newtons; world frame with z up; an object's base frame is the middle of its bottom.
@@ -31,6 +31,7 @@ mod event;
 mod expert;
 mod fluent;
 mod layout;
+mod mechanism;
 mod mishap;
 mod model;
 mod oracle;
@@ -55,6 +56,7 @@ mod world;
 pub use audit::AuditReport;
 pub use episode::{SharedRenderer, Simulation};
 pub use layout::LayoutError;
+pub use mechanism::{Mechanism, MechanismJoint};
 pub use mishap::MishapKind;
 pub use oracle::OracleVerdict;
 pub use profile::PhysicsProfile;

@@ -2,7 +2,7 @@
 
 use crate::{
     model::{
-        self,
+        self, Piece,
         load::{self, Wanted},
         shape::Shape,
     },
@@ -51,29 +51,34 @@ pub fn surfaces(model_file: &str) -> Result<Vec<Surface>, SurfacesError> {
     let mut found = Vec::new();
     for (link, at) in object.links.iter().zip(links) {
         for piece in link.pieces.iter().filter(|piece| piece.shown) {
-            let pose = at * piece.pose;
-            let mut add = |mesh: Arc<Mesh>, pose: Pose, scale: DVec3| {
-                found.push(Surface { mesh, scale, pose, color: piece.color });
-            };
-            match &piece.shape {
-                Shape::Solid(solid) => match solid.enclosure() {
-                    Enclosure::Box { size } => add(Arc::new(Mesh::unit_box()), pose, size),
-                    Enclosure::Cylinder { radius, height } => {
-                        add(Arc::new(Mesh::unit_cylinder()), pose, DVec3::new(radius, radius, height));
-                    }
-                },
-                Shape::Capsule { radius, height } => {
-                    add(Arc::new(Mesh::unit_cylinder()), pose, DVec3::new(*radius, *radius, *height));
-                    for end in [-0.5, 0.5] {
-                        let end = pose * Pose::from_translation(DVec3::Z * (end * height));
-                        add(Arc::new(scene::unit_ball()?), end, DVec3::splat(*radius));
-                    }
-                }
-                Shape::Ball { radius } => add(Arc::new(scene::unit_ball()?), pose, DVec3::splat(*radius)),
-                Shape::Surface { mesh, scale } => add(mesh.clone(), pose, *scale),
-                Shape::Hull(_) => {}
-            }
+            found.extend(of_piece(piece, &at)?);
         }
     }
     if found.is_empty() { Err(SurfacesError::Empty(model_file.into())) } else { Ok(found) }
+}
+
+/// What is seen of a piece whose link stands at a pose.
+pub(crate) fn of_piece(piece: &Piece, link: &Pose) -> Result<Vec<Surface>, MeshError> {
+    let pose = *link * piece.pose;
+    let surface = |mesh: Arc<Mesh>, pose: Pose, scale: DVec3| Surface { mesh, scale, pose, color: piece.color };
+    Ok(match &piece.shape {
+        Shape::Solid(solid) => match solid.enclosure() {
+            Enclosure::Box { size } => vec![surface(Arc::new(Mesh::unit_box()), pose, size)],
+            Enclosure::Cylinder { radius, height } => {
+                vec![surface(Arc::new(Mesh::unit_cylinder()), pose, DVec3::new(radius, radius, height))]
+            }
+        },
+        Shape::Capsule { radius, height } => {
+            let ball = Arc::new(scene::unit_ball()?);
+            let end = |side: f64| {
+                let pose = pose * Pose::from_translation(DVec3::Z * (side * height));
+                surface(Arc::clone(&ball), pose, DVec3::splat(*radius))
+            };
+            let middle = surface(Arc::new(Mesh::unit_cylinder()), pose, DVec3::new(*radius, *radius, *height));
+            vec![middle, end(-0.5), end(0.5)]
+        }
+        Shape::Ball { radius } => vec![surface(Arc::new(scene::unit_ball()?), pose, DVec3::splat(*radius))],
+        Shape::Surface { mesh, scale } => vec![surface(mesh.clone(), pose, *scale)],
+        Shape::Hull(_) => Vec::new(),
+    })
 }

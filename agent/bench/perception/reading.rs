@@ -45,7 +45,7 @@ pub fn measure(args: &PerceptionArgs, result: &mut BenchResult) -> anyhow::Resul
         }
     };
     let library = Arc::new(acm_memory::default_library()?);
-    let grounder = Grounder::new(Arc::clone(&library), GrounderConfig::default());
+    let grounder = Grounder::new(Arc::clone(&library), GrounderConfig { read: true, ..GrounderConfig::default() });
     let asked = args.common.episodes.unwrap_or(PHOTOS).min(PHOTOS);
     let count = if args.common.quick { asked.div_ceil(10) } else { asked };
     if let Some(folder) = &args.pictures {
