@@ -142,13 +142,16 @@ fn recognise<'a>(context: Context<'a>, measured: &Measured, evidence: &Evidence)
     let (model, (at, yaw)) = as_remembered(context, part, measured)?;
     let (model, tracked) = if settled { (model.rigid(), Some(part)) } else { (model, None) };
     let start = model.start(at, yaw);
-    let near = approach(&model, &evidence.thinned(ROUGHLY), &start);
-    let minimum = canonical(&model, minimise(&model, evidence, &near), evidence)?;
-    let score = score(context, &model, &minimum, evidence);
-    let found = Hypothesis { model, minimum, score, probability: 1.0, tracked };
-    let (on_surface, on_outline) = found.explained(evidence);
-    let misfit = found.minimum.cost / (0.5 * evidence.independent()).max(1.0);
-    (misfit < RECOGNISED_MISFIT && on_surface > RECOGNISED && on_outline > RECOGNISED_OUTLINE).then_some(found)
+    let fitted = |start: &[f64]| {
+        let minimum = canonical(&model, minimise(&model, evidence, start), evidence)?;
+        let score = score(context, &model, &minimum, evidence);
+        let found = Hypothesis { model: model.clone(), minimum, score, probability: 1.0, tracked };
+        let (on_surface, on_outline) = found.explained(evidence);
+        let misfit = found.minimum.cost / (0.5 * evidence.independent()).max(1.0);
+        (misfit < RECOGNISED_MISFIT && on_surface > RECOGNISED && on_outline > RECOGNISED_OUTLINE).then_some(found)
+    };
+    // What has not moved is near enough as it is.
+    fitted(&start).or_else(|| fitted(&approach(&model, &evidence.thinned(ROUGHLY), &start)))
 }
 
 /// A template brought near to a minimum.

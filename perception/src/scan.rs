@@ -7,6 +7,7 @@ use acm_concept::{
     object::Blindness,
 };
 use glam::DVec3;
+use rayon::prelude::*;
 use std::sync::OnceLock;
 
 /// An image with fewer bright pixels is black. A white one must be whiter still: a bright table may nearly fill it.
@@ -124,27 +125,34 @@ fn share(color: &[u8], holds: impl Fn(&[u8]) -> bool) -> f64 {
 
 /// Averages each depth with those of its 5x5 neighbours that lie on the same surface; fills lone holes.
 fn smooth(grid: Grid, depth: &[f32], config: &GrounderConfig) -> Vec<f32> {
-    grid.map(|at| {
-        let (column, row) = (grid.column(at), grid.row(at));
-        let rows = row.saturating_sub(2)..=(row + 2).min(grid.height - 1);
-        let (from, to) = (column.saturating_sub(2), (column + 2).min(grid.width - 1));
-        let mut centre = depth[at];
-        let mut gate_m = 0.006 + 3.0 * config.depth_sigma_m(f64::from(centre)) as f32;
-        if centre == 0.0 {
-            let Some((median, near)) = hole(grid, depth, column, row) else { return 0.0 };
-            (centre, gate_m) = (median, near);
-        }
-        let (mut sum, mut count) = (0f32, 0f32);
-        for r in rows {
-            for &z in &depth[r * grid.width + from..=r * grid.width + to] {
-                // Without a branch: what is far counts nothing.
-                let near = if (z - centre).abs() < gate_m && z > 0.0 { 1.0 } else { 0.0 };
-                sum += near * z;
-                count += near;
+    let mut out = vec![0f32; depth.len()];
+    out.par_chunks_mut(grid.width).enumerate().with_min_len(16).for_each(|(row, out)| {
+        // The depth each pixel is compared with, and how near to it is the same surface; nothing is near to no depth.
+        let reference = |column: usize| match depth[grid.index(column, row)] {
+            0.0 => hole(grid, depth, column, row).unwrap_or((0.0, 0.0)),
+            z => (z, 0.006 + 3.0 * config.depth_sigma_m(f64::from(z)) as f32),
+        };
+        let (centre, gate_m): (Vec<f32>, Vec<f32>) = (0..grid.width).map(reference).unzip();
+        let (mut sum, mut count) = (vec![0f32; grid.width], vec![0f32; grid.width]);
+        for other in row.saturating_sub(2)..=(row + 2).min(grid.height - 1) {
+            let line = &depth[other * grid.width..(other + 1) * grid.width];
+            for shift in 0..5 {
+                // The neighbour `shift - 2` columns on; a whole row at once, without a branch.
+                let (skip, from) = (2usize.saturating_sub(shift), shift.saturating_sub(2));
+                let references = centre[skip..].iter().zip(&gate_m[skip..]);
+                let sums = sum[skip..].iter_mut().zip(&mut count[skip..]);
+                for (((sum, count), (centre, gate_m)), &z) in sums.zip(references).zip(&line[from..]) {
+                    let near = if (z - centre).abs() < *gate_m && z > 0.0 { 1.0 } else { 0.0 };
+                    *sum += near * z;
+                    *count += near;
+                }
             }
         }
-        if count > 0.0 { sum / count } else { centre }
-    })
+        for (((out, sum), count), centre) in out.iter_mut().zip(&sum).zip(&count).zip(&centre) {
+            *out = if *count > 0.0 { sum / count } else { *centre };
+        }
+    });
+    out
 }
 
 /// A depth for a hole whose direct surroundings are mostly measured and of one surface.

@@ -7,6 +7,7 @@ use super::{
 };
 use acm_concept::object::Observability;
 use glam::DVec2;
+use rayon::prelude::*;
 
 /// Rise of the cost (negative log likelihood) by which a value is excluded.
 const EXCLUDED: f64 = 4.5;
@@ -26,13 +27,9 @@ pub(crate) struct Profile {
 
 /// Profiles every template parameter at a minimum. The curvature alone is blind to faces that nobody saw.
 pub(crate) fn profile(model: &Model, evidence: &Evidence, minimum: &Minimum) -> Profile {
-    let mut drift2 = DVec2::ZERO;
-    let mut one = |parameter: usize| {
-        let (observability, drift) = one(model, evidence, minimum, parameter);
-        drift2 += drift * drift;
-        observability
-    };
-    let parameters = (0..model.template.parameters.len()).map(&mut one).collect();
+    let of_each = (0..model.template.parameters.len()).into_par_iter().map(|i| one(model, evidence, minimum, i));
+    let (parameters, drifts): (Vec<Observability>, Vec<DVec2>) = of_each.unzip();
+    let drift2 = drifts.into_iter().map(|drift| drift * drift).sum::<DVec2>();
     Profile { parameters, drift_m: DVec2::new(drift2.x.sqrt(), drift2.y.sqrt()) }
 }
 
