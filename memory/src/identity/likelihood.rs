@@ -28,7 +28,7 @@ const FITS_WITHIN: f64 = 1.15;
 /// Likelihood ratio of a fragment that fits, whatever template was fitted to it.
 const FRAGMENT: f64 = 0.5;
 /// Systematic error of a length that all views from one side share, metres: many views do not average it out.
-const VIEW_BIAS_M: f64 = 0.005;
+const VIEW_BIAS_M: f64 = 0.004;
 /// What perception's own hint is worth, natural logarithm of 3.
 const HINT: f64 = 1.1;
 
