@@ -10,7 +10,8 @@
 //! | [`config`], [`grounder`] | thresholds; the whole pipeline |
 //! | [`frames`], [`level`](mod@level) | colour and depth files; the camera pose over the dominant plane when none is known |
 //! | `scan`, `support`, `scene`, `own` | pixels to points, the plane and its extent, heights, the robot's own pixels |
-//! | `segments`, `joins`, `patches` | what stands on the plane, what lies in it |
+//! | `segments`, `joins`, `parting`, `patches` | what stands on the plane, put together and cut by what it is; what lies in it |
+//! | `frozen` | a camera that has stopped |
 //! | `measure`, `fit`, `hypotheses` | first guesses, template fits, the choice among templates |
 //! | `reading` | digits, marks, lamps and needles on things |
 //! | [`given`] | first guess and fit of things whose pixels are given |
