@@ -1,11 +1,10 @@
 //! The comparison of a frame with what memory expects to see in it.
 
-use crate::{
-    raster,
-    scan::Tint,
-    scene::Scene,
-    segments::{NONE, Segments},
-};
+mod cut;
+
+pub(crate) use cut::{merge, split};
+
+use crate::{raster, scan::Tint, scene::Scene};
 use acm_concept::{
     color::Appearance,
     expectation::{Expectation, ExpectedObject},
@@ -15,7 +14,8 @@ use acm_concept::{
     solid::PlacedSolid,
     template::{SeenBy, TemplateLibrary},
 };
-use std::collections::BTreeMap;
+use glam::DVec3;
+use rayon::prelude::*;
 
 /// Solids thinner than this lie in the plane for the depth camera: colour decides.
 const FLAT_M: f64 = 0.006;
@@ -29,19 +29,17 @@ const SAME_OVERLAP: f64 = 0.25;
 const EXPLAINED: f64 = 0.6;
 /// From so many views on a thing's parameters are taken as known while they explain what is seen.
 const SETTLED_VIEWS: u32 = 6;
-/// An expected object claims a segment of which it explains so much.
-const CLAIMED: f64 = 0.75;
-/// Expected objects split a segment if each finds at least so many of its pixels in it, and so much of itself.
-const SPLIT_PX: usize = 60;
-const SPLIT_SHARE: f64 = 0.4;
 
 /// One expected object, ray-cast.
-struct Ghost {
-    id: ObjectId,
+pub(crate) struct Ghost {
+    pub id: ObjectId,
     main: Option<GroundedPart>,
-    views: u32,
-    solids: Vec<PlacedSolid>,
-    flat: bool,
+    pub appearance: Appearance,
+    pub views: u32,
+    pub held: bool,
+    pub solids: Vec<PlacedSolid>,
+    /// Told by its colour alone.
+    pub flat: bool,
     /// Share of it that the sensor covers.
     in_view: f64,
     /// Its predicted pixels, ascending, and what each says.
@@ -57,9 +55,34 @@ pub(crate) struct Known<'a> {
     pub settled: bool,
 }
 
+impl Ghost {
+    /// What memory expects here; nothing of a thing without parts.
+    pub fn known(&self) -> Option<Known<'_>> {
+        let part = self.main.as_ref()?;
+        Some(Known { part, settled: self.views >= SETTLED_VIEWS })
+    }
+    /// Its predicted pixels in which it is seen, ascending.
+    pub fn agreeing(&self) -> impl Iterator<Item = usize> + '_ {
+        self.votes.iter().filter(|(_, vote)| *vote == Vote::Agrees).map(|(pixel, _)| *pixel)
+    }
+    /// In how many of its pixels it is seen, and through how many the camera looks.
+    pub fn agreement(&self) -> (usize, usize) {
+        let count = |vote| self.votes.iter().filter(|(_, v)| *v == vote).count();
+        (count(Vote::Agrees), count(Vote::Farther))
+    }
+    /// Whether it is seen where it is expected.
+    pub fn is_seen(&self) -> bool {
+        view(self).visibility == Visibility::Seen
+    }
+    /// Signed distance of a point of the world from its surface, metres.
+    pub fn distance_m(&self, point: DVec3) -> f64 {
+        self.solids.iter().map(|solid| solid.signed_distance(point)).fold(f64::INFINITY, f64::min)
+    }
+}
+
 /// The expected objects, ray-cast into the frame and compared with it.
 pub(crate) struct Remembered {
-    ghosts: Vec<Ghost>,
+    pub ghosts: Vec<Ghost>,
     /// The main parts of those that are not seen where they are expected.
     pub displaced: Vec<GroundedPart>,
 }
@@ -96,15 +119,17 @@ impl Remembered {
             Ghost {
                 id: object.id,
                 main: object.parts.first().cloned(),
+                appearance: object.appearance,
                 views: object.views,
+                held: object.held,
                 flat,
                 in_view: cast.in_view,
                 votes: cast.hits.into_iter().map(vote).collect(),
                 solids,
             }
         };
-        let ghosts: Vec<Ghost> = expectation.objects.iter().map(ghost).collect();
-        let elsewhere = ghosts.iter().filter(|ghost| view(ghost).visibility != Visibility::Seen);
+        let ghosts: Vec<Ghost> = expectation.objects.par_iter().map(ghost).collect();
+        let elsewhere = ghosts.iter().filter(|ghost| !ghost.is_seen());
         Remembered { displaced: elsewhere.filter_map(|ghost| ghost.main.clone()).collect(), ghosts }
     }
 
@@ -113,13 +138,12 @@ impl Remembered {
     pub fn at(&self, pixels: &[usize], seen_by: SeenBy) -> Option<Known<'_>> {
         let flat = seen_by == SeenBy::Color;
         let explained = |ghost: &Ghost| {
-            let agrees = |(pixel, vote): &&(usize, Vote)| *vote == Vote::Agrees && pixels.binary_search(pixel).is_ok();
-            ghost.votes.iter().filter(agrees).count() as f64 / pixels.len().max(1) as f64
+            let agrees = ghost.agreeing().filter(|pixel| pixels.binary_search(pixel).is_ok());
+            agrees.count() as f64 / pixels.len().max(1) as f64
         };
         let candidates = self.ghosts.iter().filter(|ghost| ghost.flat == flat);
         let (best, ghost) = candidates.map(|ghost| (explained(ghost), ghost)).max_by(|a, b| a.0.total_cmp(&b.0))?;
-        let part = ghost.main.as_ref().filter(|_| best > EXPLAINED || overlap(ghost, pixels) > SAME_OVERLAP)?;
-        Some(Known { part, settled: ghost.views >= SETTLED_VIEWS })
+        ghost.known().filter(|_| best > EXPLAINED || overlap(ghost, pixels) > SAME_OVERLAP)
     }
 }
 
@@ -140,10 +164,11 @@ fn is_flat(solids: &[PlacedSolid]) -> bool {
 /// Intersection over union of a ghost's pixels, those that something nearer covers left out, with a percept's
 /// (ascending).
 fn overlap(ghost: &Ghost, pixels: &[usize]) -> f64 {
-    let (mut common, mut visible) = (0usize, 0usize);
+    let (mut common, mut visible, mut rest) = (0usize, 0usize, pixels.iter().peekable());
     for (pixel, _) in ghost.votes.iter().filter(|(_, vote)| *vote != Vote::Nearer) {
         visible += 1;
-        common += usize::from(pixels.binary_search(pixel).is_ok());
+        while rest.next_if(|own| *own < pixel).is_some() {}
+        common += usize::from(rest.peek() == Some(&pixel));
     }
     common as f64 / (visible + pixels.len() - common).max(1) as f64
 }
@@ -156,8 +181,7 @@ fn depth_vote(scene: &Scene, held: bool, pixel: usize, predicted: f64) -> Vote {
     if measured == 0.0 {
         return Vote::Unmeasured;
     }
-    let place_m = if held { 0.03 } else { 0.01 };
-    let tolerance = place_m + 2.5 * scene.config.depth_sigma_m(measured);
+    let tolerance = tolerance_m(scene, measured, held);
     if measured < predicted - tolerance {
         Vote::Nearer
     } else if measured > predicted + tolerance {
@@ -165,6 +189,12 @@ fn depth_vote(scene: &Scene, held: bool, pixel: usize, predicted: f64) -> Vote {
     } else {
         Vote::Agrees
     }
+}
+
+/// How far what is where it is expected may be from there, at a measured depth: errors of places and noise, metres.
+pub(crate) fn tolerance_m(scene: &Scene, measured: f64, held: bool) -> f64 {
+    let place_m = if held { 0.03 } else { 0.01 };
+    place_m + 2.5 * scene.config.depth_sigma_m(measured)
 }
 
 /// The vote of a pixel on something flat: whether the surface there has its colour or the bare surface's.
@@ -236,68 +266,6 @@ pub(crate) fn hint(remembered: &Remembered, objects: &mut [GroundedObject], libr
         if objects[object].expected.is_none() && !taken[ghost] {
             objects[object].expected = Some(remembered.ghosts[ghost].id);
             taken[ghost] = true;
-        }
-    }
-}
-
-/// Joins segments that one expected object explains: pieces of one thing between which noise has drawn an edge.
-pub(crate) fn merge(remembered: &Remembered, segments: &mut Segments) {
-    let mut size = vec![0usize; segments.count];
-    for label in segments.labels.iter().filter(|label| **label != NONE) {
-        size[*label as usize] += 1;
-    }
-    let mut claimed = vec![false; segments.count];
-    for ghost in remembered.ghosts.iter().filter(|ghost| !ghost.flat) {
-        let mut agreeing = vec![0usize; size.len()];
-        for (pixel, _) in ghost.votes.iter().filter(|(_, vote)| *vote == Vote::Agrees) {
-            if let Some(count) = agreeing.get_mut(segments.labels[*pixel] as usize) {
-                *count += 1;
-            }
-        }
-        let claims = |label: &usize| agreeing[*label] > 0 && agreeing[*label] as f64 > CLAIMED * size[*label] as f64;
-        let pieces: Vec<usize> = (0..size.len()).filter(|label| !claimed[*label]).filter(claims).collect();
-        let Some((&whole, rest)) = pieces.split_first() else { continue };
-        for label in segments.labels.iter_mut().filter(|label| rest.contains(&(**label as usize))) {
-            *label = whole as u32;
-        }
-        for label in pieces {
-            claimed[label] = true;
-        }
-    }
-}
-
-/// Cuts segments in which two or more expected objects are found, each pixel going to the nearest of them.
-pub(crate) fn split(scene: &Scene, remembered: &Remembered, segments: &mut Segments) {
-    let mut found: BTreeMap<u32, Vec<&Ghost>> = BTreeMap::new();
-    for ghost in remembered.ghosts.iter().filter(|ghost| !ghost.flat) {
-        let mut agreeing: BTreeMap<u32, usize> = BTreeMap::new();
-        let mut visible = 0usize;
-        for &(pixel, vote) in &ghost.votes {
-            visible += usize::from(vote != Vote::Nearer);
-            if vote == Vote::Agrees && segments.labels[pixel] != NONE {
-                *agreeing.entry(segments.labels[pixel]).or_insert(0) += 1;
-            }
-        }
-        let enough = |(_, count): &(u32, usize)| *count >= SPLIT_PX && *count as f64 > SPLIT_SHARE * visible as f64;
-        if let Some((label, _)) = agreeing.into_iter().max_by_key(|(_, count)| *count).filter(enough) {
-            found.entry(label).or_default().push(ghost);
-        }
-    }
-    let to_world = scene.world;
-    for (label, ghosts) in found.into_iter().filter(|(_, ghosts)| ghosts.len() > 1) {
-        let first = segments.count as u32;
-        segments.count += ghosts.len();
-        for pixel in 0..segments.labels.len() {
-            if segments.labels[pixel] != label {
-                continue;
-            }
-            let point = to_world.transform_point(scene.point[pixel].as_dvec3());
-            let distance =
-                |ghost: &&Ghost| ghost.solids.iter().map(|s| s.signed_distance(point)).fold(f64::INFINITY, f64::min);
-            let nearest = ghosts.iter().map(distance).enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
-            if let Some((i, _)) = nearest.filter(|(_, d)| *d < 0.02) {
-                segments.labels[pixel] = first + i as u32;
-            }
         }
     }
 }

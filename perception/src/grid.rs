@@ -44,32 +44,6 @@ impl Grid {
         [right, below, left, index.checked_sub(width)].into_iter().flatten()
     }
 
-    /// For every pixel, the extreme of a square window of half width `radius` under `pick`.
-    pub fn window(self, values: &[f32], radius: usize, pick: impl Fn(f32, f32) -> f32 + Sync) -> Vec<f32> {
-        let mut across = values.to_vec();
-        let rows = across.par_chunks_mut(self.width).zip(values.par_chunks(self.width)).with_min_len(16);
-        rows.for_each(|(across, line)| {
-            for step in 1..=radius.min(self.width.saturating_sub(1)) {
-                for (at, &value) in across.iter_mut().zip(&line[step..]) {
-                    *at = pick(*at, value);
-                }
-                for (at, &value) in across[step..].iter_mut().zip(line) {
-                    *at = pick(*at, value);
-                }
-            }
-        });
-        let mut both = across.clone();
-        both.par_chunks_mut(self.width).enumerate().with_min_len(16).for_each(|(row, both)| {
-            let (from, to) = (row.saturating_sub(radius), (row + radius).min(self.height - 1));
-            for other in from..=to {
-                for (at, &value) in both.iter_mut().zip(&across[other * self.width..(other + 1) * self.width]) {
-                    *at = pick(*at, value);
-                }
-            }
-        });
-        both
-    }
-
     /// Number of set pixels in the square window of half width `radius` round each pixel.
     pub fn count(self, mask: &[bool], radius: usize) -> Vec<u16> {
         let mut across = vec![0u16; self.len()];
@@ -109,6 +83,47 @@ impl Grid {
     pub fn erode(self, mask: &[bool], radius: usize) -> Vec<bool> {
         let inverse: Vec<bool> = mask.iter().map(|set| !set).collect();
         self.count(&inverse, radius).into_iter().map(|n| n == 0).collect()
+    }
+
+    /// Four-connected components of the set pixels, as [`Grid::components`] gives them where all neighbours are linked: by
+    /// runs of pixels, of which there are far fewer.
+    pub fn blobs(self, mask: &[bool]) -> (Vec<u32>, Vec<usize>) {
+        let mut runs: Vec<std::ops::Range<usize>> = Vec::new();
+        // Where the runs of each row begin.
+        let mut rows = Vec::with_capacity(self.height + 1);
+        for row in 0..self.height {
+            rows.push(runs.len());
+            let (mut at, end) = (row * self.width, (row + 1) * self.width);
+            while let Some(first) = mask[at..end].iter().position(|set| *set) {
+                let length = mask[at + first..end].iter().position(|set| !set).unwrap_or(end - at - first);
+                runs.push(at + first..at + first + length);
+                at += first + length;
+            }
+        }
+        rows.push(runs.len());
+        let mut sets = DisjointSets::new(runs.len());
+        for row in 1..self.height {
+            let (mut above, mut own) = (rows[row - 1], rows[row]);
+            while above < rows[row] && own < rows[row + 1] {
+                let (from, to) = (runs[above].start + self.width, runs[above].end + self.width);
+                if from < runs[own].end && runs[own].start < to {
+                    sets.join(above, own);
+                }
+                if to < runs[own].end { above += 1 } else { own += 1 }
+            }
+        }
+        // A root is the first of its runs, so that names are in reading order.
+        let (mut labels, mut sizes, mut names) = (vec![u32::MAX; self.len()], Vec::new(), vec![0u32; runs.len()]);
+        for (at, run) in runs.into_iter().enumerate() {
+            let root = sets.root(at);
+            if root == at {
+                names[at] = sizes.len() as u32;
+                sizes.push(0);
+            }
+            sizes[names[root] as usize] += run.len();
+            labels[run].fill(names[root]);
+        }
+        (labels, sizes)
     }
 
     /// Four-connected components of the set pixels that `joined` allows to be linked: a label for every pixel
@@ -165,6 +180,7 @@ impl DisjointSets {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
 
     const GRID: Grid = Grid { width: 5, height: 4 };
 
@@ -190,10 +206,11 @@ mod tests {
         assert_eq!(cut, [2, 3]);
     }
 
-    #[test]
-    fn windows_take_the_extreme_over_a_square() {
-        let values: Vec<f32> = (0..20).map(|i| i as f32).collect();
-        let high = GRID.window(&values, 1, f32::max);
-        assert_eq!((high[0], high[19], high[7]), (6.0, 19.0, 13.0));
+    proptest! {
+        #[test]
+        fn blobs_are_the_components_of_plain_neighbours(mask in prop::collection::vec(prop::bool::weighted(0.6), 9 * 7)) {
+            let grid = Grid { width: 9, height: 7 };
+            prop_assert_eq!(grid.blobs(&mask), grid.components(&mask, |_, _| true));
+        }
     }
 }

@@ -5,6 +5,7 @@ mod assisted;
 mod bases;
 mod beliefs;
 mod completion;
+mod explained;
 mod single;
 
 pub use assisted::{Assisted, AssistedGrounder};
@@ -30,6 +31,7 @@ use acm_concept::{
 };
 use assisted::Aid;
 use bases::Bodies;
+use explained::Explained;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -157,7 +159,10 @@ impl Grounder {
             displaced: &remembered.displaced,
             remembered: None,
         };
-        let mut segments = self.segments(scene, unremembered, remembered);
+        // A tool that segments is asked about all that stands there.
+        let mut explained =
+            if aid.is_none() { explained::find(scene, unremembered, remembered) } else { Vec::new() };
+        let mut segments = self.segments(scene, unremembered, remembered, &mut explained);
         aid.cut(scene, &expectation.nouns, &mut segments);
         let standing: Vec<bool> = segments.labels.iter().map(|label| *label != NONE).collect();
         let context = |remembered| Context { remembered, ..unremembered };
@@ -172,15 +177,19 @@ impl Grounder {
                 objects.push(object);
             }
         }
-        let mut pieces: Vec<(f64, Vec<usize>, Evidence)> = segments
-            .pixels()
-            .into_par_iter()
-            .filter(|pixels| !pixels.is_empty())
-            .map(|pixels| {
-                let evidence = Evidence::of_segment(scene, &segments, &pixels);
-                (scene.lowest_m(&pixels), pixels, evidence)
-            })
-            .collect();
+        let as_expected = |thing: &Explained| {
+            let context = Context { remembered: Some(thing.known), ..unremembered };
+            assemble::object(scene, context, std::slice::from_ref(&thing.fit), &thing.evidence, &thing.pixels, 1.0)
+        };
+        objects.par_extend(explained.par_iter().filter_map(as_expected));
+        explained.iter().for_each(|thing| bodies.add(std::slice::from_ref(&thing.fit)));
+        let mut open = segments.pixels();
+        explained.iter().for_each(|thing| open[thing.label as usize].clear());
+        let measure = |pixels: Vec<usize>| {
+            let evidence = Evidence::of_segment(scene, &segments, &pixels);
+            (scene.lowest_m(&pixels), pixels, evidence)
+        };
+        let mut pieces: Vec<_> = open.into_par_iter().filter(|pixels| !pixels.is_empty()).map(measure).collect();
         // From below, so that what stands on another thing finds it.
         pieces.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         for (lowest_m, pixels, evidence) in pieces {

@@ -135,7 +135,11 @@ pub(crate) fn rank<'a>(context: Context<'a>, measured: &Measured, evidence: &Evi
 
 /// What memory knows and what explains the evidence as well as noise lets anything do, fitted from where it is expected:
 /// no other template is tried. Of what is settled only the place is fitted.
-fn recognise<'a>(context: Context<'a>, measured: &Measured, evidence: &Evidence) -> Option<Hypothesis<'a>> {
+pub(crate) fn recognise<'a>(
+    context: Context<'a>,
+    measured: &Measured,
+    evidence: &Evidence,
+) -> Option<Hypothesis<'a>> {
     // What is not settled must be seen whole: of what is cut off the ranking decides whether memory's sizes are taken over.
     let whole = evidence.cut_share() <= TRACKED_CUT;
     let Known { part, settled } = context.remembered.filter(|known| known.settled || whole)?;

@@ -11,7 +11,7 @@ use crate::{
 use acm_concept::{solid::PlacedSolid, template::SeenBy};
 use glam::DVec2;
 use rayon::prelude::*;
-use std::collections::BTreeSet;
+use std::{collections::BTreeSet, ops::Range};
 
 /// Most joins in one frame.
 const MAX_JOINS: usize = 24;
@@ -92,8 +92,9 @@ enum Relation {
     OnePart,
 }
 
-/// Joins pieces until no two belong together.
-pub(crate) fn join(scene: &Scene, segments: &mut Segments, context: Context) {
+/// Joins pieces until no two belong together. Pieces with the labels in `known` are whole as they are: no two of them are
+/// joined, but to each may belong what is left beside it.
+pub(crate) fn join(scene: &Scene, segments: &mut Segments, context: Context, known: Range<u32>) {
     let mut pieces: Vec<Piece> = (0..segments.count as u32)
         .into_par_iter()
         .zip(segments.pixels())
@@ -102,7 +103,10 @@ pub(crate) fn join(scene: &Scene, segments: &mut Segments, context: Context) {
     // Pairs that the costly tests refused: asked again only when one of them has changed.
     let mut refused: BTreeSet<(Relation, u32, u32)> = BTreeSet::new();
     for _ in 0..MAX_JOINS {
-        let Some((first, second, relation)) = related(scene, segments, context, &pieces, &mut refused) else { return };
+        let Some((first, second, relation)) = related(scene, segments, context, &pieces, &known, &mut refused)
+        else {
+            return;
+        };
         let name = if relation == Relation::Artefact { NONE } else { first };
         for (label, inner) in segments.labels.iter_mut().zip(&mut segments.inner).filter(|(l, _)| **l == second) {
             *label = name;
@@ -129,6 +133,7 @@ fn related(
     segments: &Segments,
     context: Context,
     pieces: &[Piece],
+    known: &Range<u32>,
     refused: &mut BTreeSet<(Relation, u32, u32)>,
 ) -> Option<(u32, u32, Relation)> {
     let relations = [
@@ -141,8 +146,11 @@ fn related(
         Relation::OnePart,
     ];
     for relation in relations {
-        for (a, b) in pieces.iter().flat_map(|a| pieces.iter().map(move |b| (a, b))).filter(|(a, b)| a.label != b.label)
-        {
+        let pairs = pieces.iter().flat_map(|a| pieces.iter().map(move |b| (a, b)));
+        let unlike = |(a, b): &(&Piece, &Piece)| {
+            a.label != b.label && !(known.contains(&a.label) && known.contains(&b.label))
+        };
+        for (a, b) in pairs.filter(unlike) {
             let key = (relation, a.label, b.label);
             if refused.contains(&key) {
                 continue;

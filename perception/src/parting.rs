@@ -8,6 +8,7 @@ use crate::{
     scene::Scene,
     segments::Segments,
 };
+use std::ops::Range;
 
 /// Two colours differ by at least this, in the units of a tint, and by so many times their own spread.
 const CONTRAST: f32 = 14.0;
@@ -17,9 +18,10 @@ const IN_ONE_PLACE: f64 = 0.85;
 /// Most cuts in one frame.
 const MAX_CUTS: usize = 12;
 
-/// Parts segments until none shows two things.
-pub(crate) fn part(scene: &Scene, segments: &mut Segments, context: Context) {
-    let mut open: Vec<(u32, Vec<usize>)> = (0..).zip(segments.pixels()).collect();
+/// Parts segments until none shows two things. Those with the labels in `known` are left as they are.
+pub(crate) fn part(scene: &Scene, segments: &mut Segments, context: Context, known: Range<u32>) {
+    let mut open: Vec<(u32, Vec<usize>)> =
+        (0..).zip(segments.pixels()).filter(|(label, _)| !known.contains(label)).collect();
     let mut cuts = 0;
     while let Some((label, pixels)) = open.pop() {
         let Some(halves) = halves(scene, &pixels).filter(|_| cuts < MAX_CUTS) else { continue };
@@ -50,7 +52,7 @@ fn halves(scene: &Scene, pixels: &[usize]) -> Option<[Vec<usize>; 2]> {
         let own = |tint: &Tint| (tint.distance(&means[0]) <= tint.distance(&means[1])) == first;
         pixels.iter().zip(&tints).filter(|(_, tint)| own(tint)).for_each(|(&pixel, _)| mask[pixel] = true);
         let all = mask.iter().filter(|set| **set).count();
-        let (labels, sizes) = scene.grid.components(mask, |_, _| true);
+        let (labels, sizes) = scene.grid.blobs(mask);
         let (largest, size) = (0u32..).zip(&sizes).max_by_key(|(_, size)| **size)?;
         let held = *size as f64 > IN_ONE_PLACE * all as f64 && *size >= scene.min_segment_px();
         held.then(|| pixels.iter().copied().filter(|&pixel| labels[pixel] == largest).collect::<Vec<_>>())

@@ -55,8 +55,8 @@ pub(crate) fn find(scene: &Scene, standing: &[bool]) -> Vec<Patch> {
     let firm = scene.grid.dilate(&scene.grid.erode(&tinted, 1), 1);
     let mask: Vec<bool> = (0..tinted.len()).map(|i| tinted[i] && firm[i]).collect();
     let alike = |a: usize, b: usize| scene.scan.tint(a).distance(&scene.scan.tint(b)) < ALIKE;
-    let mut pieces = connected(scene, &mask, alike);
-    for blob in connected(scene, &mask, |_, _| true) {
+    let mut pieces = areas(scene, scene.grid.components(&mask, alike));
+    for blob in areas(scene, scene.grid.blobs(&mask)) {
         let colors = pieces.iter().filter(|piece| piece.iter().any(|at| blob.binary_search(at).is_ok())).count();
         if colors >= PATTERN_PIECES && is_full(scene, &ground, &blob) {
             pieces.retain(|piece| !piece.iter().any(|at| blob.binary_search(at).is_ok()));
@@ -67,9 +67,8 @@ pub(crate) fn find(scene: &Scene, standing: &[bool]) -> Vec<Patch> {
     pieces.into_iter().filter_map(|pixels| patch(scene, &ground, pixels)).collect()
 }
 
-/// Connected areas of a mask that are not too small, each ascending.
-fn connected(scene: &Scene, mask: &[bool], joined: impl Fn(usize, usize) -> bool) -> Vec<Vec<usize>> {
-    let (labels, sizes) = scene.grid.components(mask, joined);
+/// The pixels of components that are not too small, each ascending.
+fn areas(scene: &Scene, (labels, sizes): (Vec<u32>, Vec<usize>)) -> Vec<Vec<usize>> {
     let mut areas: Vec<Vec<usize>> = vec![Vec::new(); sizes.len()];
     for (index, &label) in labels.iter().enumerate() {
         if sizes.get(label as usize).is_some_and(|size| *size >= scene.min_segment_px() / 2) {

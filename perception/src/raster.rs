@@ -1,8 +1,12 @@
 //! Ray-casts solids into the image: predicted depth of what is remembered, pixels of the robot itself.
 
-use crate::grid::Grid;
-use acm_concept::{camera::Intrinsics, pose::Pose, solid::PlacedSolid};
-use glam::DVec3;
+use crate::{fit::corners, grid::Grid};
+use acm_concept::{
+    camera::Intrinsics,
+    pose::Pose,
+    solid::{PlacedSolid, Solid},
+};
+use glam::{DVec2, DVec3};
 
 /// Pixels whose rays meet a set of solids, with the depth (along the optical axis, metres) at which they enter.
 #[derive(Debug, Default)]
@@ -20,17 +24,21 @@ pub(crate) fn cast(intrinsics: &Intrinsics, grid: Grid, camera: &Pose, solids: &
     let to_camera = camera.inverse();
     for solid in solids {
         let pose = to_camera * solid.pose;
-        let Some((bounds, area, visible)) = bounds(intrinsics, &pose, solid.solid.bounding_radius()) else {
+        let Some(image) = Disc::of(intrinsics, &pose, solid.solid.bounding_radius()) else {
             full_area += 1.0;
             continue;
         };
-        full_area += area;
-        seen_area += visible;
+        full_area += image.area;
+        seen_area += image.visible;
         let inverse = pose.inverse();
         let origin = inverse.translation;
+        // Rays are linear in the pixel.
+        let [across, down, ahead] = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| inverse.transform_vector(axis));
+        let bounds = tightened(image.bounds, intrinsics, &pose, &solid.solid);
         for row in bounds[1]..bounds[3] {
+            let line = ahead + down * ((row as f64 - intrinsics.cy) / intrinsics.fy);
             for column in bounds[0]..bounds[2] {
-                let direction = inverse.transform_vector(intrinsics.ray(column as f64, row as f64));
+                let direction = line + across * ((column as f64 - intrinsics.cx) / intrinsics.fx);
                 if let Some((enter, _)) = solid.solid.intersect_ray(origin, direction)
                     && enter > 0.0
                 {
@@ -45,32 +53,60 @@ pub(crate) fn cast(intrinsics: &Intrinsics, grid: Grid, camera: &Pose, solids: &
     Cast { hits, in_view }
 }
 
-/// First column and row and past-the-last column and row of the square round a sphere's image, its area and the
-/// area on the sensor; `None` if the sphere reaches behind the camera's plane.
-fn bounds(intrinsics: &Intrinsics, pose: &Pose, radius: f64) -> Option<([usize; 4], f64, f64)> {
-    let centre: DVec3 = pose.translation;
-    if centre.z - radius < 0.02 {
-        return None;
+/// The square round a sphere's image.
+struct Disc {
+    /// First column and row and past-the-last column and row, on the sensor.
+    bounds: [usize; 4],
+    area: f64,
+    /// The area on the sensor.
+    visible: f64,
+}
+
+impl Disc {
+    /// `None` if the sphere reaches behind the camera's plane.
+    fn of(intrinsics: &Intrinsics, pose: &Pose, radius: f64) -> Option<Disc> {
+        let centre: DVec3 = pose.translation;
+        if centre.z - radius < 0.02 {
+            return None;
+        }
+        let middle = intrinsics.project(centre)?;
+        let reach = 1.05 * radius / (centre.z - radius);
+        let reach = DVec2::new(intrinsics.fx * reach + 1.0, intrinsics.fy * reach + 1.0);
+        let bounds = on_sensor(intrinsics, middle - reach, middle + reach);
+        let visible = (bounds[2] - bounds[0]) as f64 * (bounds[3] - bounds[1]) as f64;
+        let area = (2.0 * reach.x + 1.0) * (2.0 * reach.y + 1.0);
+        Some(Disc { bounds, area: area.max(visible), visible })
     }
-    let middle = intrinsics.project(centre)?;
-    let reach = 1.05 * radius / (centre.z - radius);
-    let (rx, ry) = (intrinsics.fx * reach + 1.0, intrinsics.fy * reach + 1.0);
+}
+
+/// First column and row and past-the-last column and row of a rectangle of the image, on the sensor.
+fn on_sensor(intrinsics: &Intrinsics, low: DVec2, high: DVec2) -> [usize; 4] {
     let clip = |value: f64, limit: u32| value.clamp(0.0, f64::from(limit)) as usize;
-    let box_px = [
-        clip((middle.x - rx).floor(), intrinsics.width),
-        clip((middle.y - ry).floor(), intrinsics.height),
-        clip((middle.x + rx).ceil() + 1.0, intrinsics.width),
-        clip((middle.y + ry).ceil() + 1.0, intrinsics.height),
-    ];
-    let visible = (box_px[2] - box_px[0]) as f64 * (box_px[3] - box_px[1]) as f64;
-    let area = (2.0 * rx + 1.0) * (2.0 * ry + 1.0);
-    Some((box_px, area.max(visible), visible))
+    [
+        clip(low.x.floor(), intrinsics.width),
+        clip(low.y.floor(), intrinsics.height),
+        clip(high.x.ceil() + 1.0, intrinsics.width),
+        clip(high.y.ceil() + 1.0, intrinsics.height),
+    ]
+}
+
+/// The part of the bounds of a solid's sphere in which its own corners lie. Corners of what is round lie on it as often as
+/// between them it bulges: some are added on every side.
+fn tightened(sphere: [usize; 4], intrinsics: &Intrinsics, pose: &Pose, solid: &Solid) -> [usize; 4] {
+    const BULGE: f64 = 0.04;
+    let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+    for corner in corners(solid).into_iter().flatten() {
+        let Some(at) = intrinsics.project(pose.transform_point(corner)) else { return sphere };
+        (low, high) = (low.min(at), high.max(at));
+    }
+    let more = (high - low) * BULGE + DVec2::ONE;
+    let own = on_sensor(intrinsics, low - more, high + more);
+    [sphere[0].max(own[0]), sphere[1].max(own[1]), sphere[2].min(own[2]), sphere[3].min(own[3])]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use acm_concept::solid::Solid;
 
     const INTRINSICS: Intrinsics = Intrinsics { width: 64, height: 48, fx: 50.0, fy: 50.0, cx: 31.5, cy: 23.5 };
     const GRID: Grid = Grid { width: 64, height: 48 };

@@ -108,7 +108,7 @@ impl<'a> Scene<'a> {
         let mask = self.grid.map(flat);
         // Opened against specks on walls and floors behind, closed over lines of holes.
         let solid = self.grid.dilate(&self.grid.erode(&mask, 1), 3);
-        let (labels, sizes) = self.grid.components(&solid, |_, _| true);
+        let (labels, sizes) = self.grid.blobs(&solid);
         let largest = (0..sizes.len()).max_by_key(|&l| (sizes[l], std::cmp::Reverse(l)));
         self.in_plane = (0..mask.len()).map(|i| mask[i] && Some(labels[i] as usize) == largest).collect();
         // The plane's image is a projective map, which keeps lines straight: the ends of the rows hold the hull.

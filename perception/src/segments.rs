@@ -29,6 +29,13 @@ impl Segments {
         }
         pixels
     }
+    /// Makes a segment of some pixels; those that had a label lose it. Returns its label.
+    pub fn lay(&mut self, pixels: &[usize]) -> u32 {
+        let label = self.count as u32;
+        pixels.iter().for_each(|&pixel| self.labels[pixel] = label);
+        self.count += 1;
+        label
+    }
     /// Keeps the given segments and numbers them anew.
     pub fn keep(&mut self, kept: &[bool]) {
         let mut names = vec![NONE; self.count];
@@ -47,11 +54,11 @@ impl Segments {
 /// Half of the distance over which the bend of the surface is judged, pixels.
 const BEND_STEP: usize = 4;
 
-pub(crate) fn split(scene: &Scene) -> Segments {
-    let normals = normals(scene);
-    let jumps = jumps(scene, &normals);
-    let core = scene.grid.map(|i| scene.rising[i] && !jumps[i]);
-    let bends = bends(scene, &normals);
+/// Cuts the open pixels, which stand on the plane, into things.
+pub(crate) fn split(scene: &Scene, open: &[bool]) -> Segments {
+    let normals = normals(scene, open);
+    let core = scene.grid.map(|i| open[i] && !is_jump(scene, &normals, i));
+    let bends = bends(scene, open, &normals);
     let step_m = |a: usize| 0.004 + 0.008 * scene.scan.smooth[a] + 2.0 * noise_m(scene, a);
     let joined =
         |a: usize, b: usize| (scene.scan.smooth[a] - scene.scan.smooth[b]).abs() < step_m(a) && !(bends[a] || bends[b]);
@@ -62,10 +69,10 @@ pub(crate) fn split(scene: &Scene) -> Segments {
             *label = NONE;
         }
     }
-    grow(scene, &mut labels, 12);
+    grow(scene, open, &mut labels, 12);
     let inner = vec![false; labels.len()];
     let mut segments = Segments { count: sizes.len(), labels, inner };
-    adopt_remains(scene, &mut segments);
+    adopt_remains(scene, open, &mut segments);
     merge_smooth(scene, &normals, &mut segments);
     drop_small(scene, &mut segments);
     segments
@@ -81,10 +88,10 @@ fn normal_reach(scene: &Scene) -> isize {
 }
 
 /// Unit normals towards the camera by differences over a few pixels, wider the noisier the frame; zero where unknown.
-fn normals(scene: &Scene) -> Vec<Vec3> {
+fn normals(scene: &Scene, open: &[bool]) -> Vec<Vec3> {
     let reach = normal_reach(scene);
     let eye = scene.camera.translation.as_vec3();
-    let near = scene.grid.dilate(&scene.rising, 2);
+    let near = scene.grid.dilate(open, 2);
     scene.grid.map(|index| {
         if !near[index] || !scene.is_known(index) {
             return Vec3::ZERO;
@@ -106,31 +113,32 @@ fn normals(scene: &Scene) -> Vec<Vec3> {
     })
 }
 
-/// Pixels next to a step in depth that the slope of their own surface does not explain, or next to a hole.
-fn jumps(scene: &Scene, normals: &[Vec3]) -> Vec<bool> {
-    let far: Vec<f32> = scene.scan.smooth.iter().map(|&z| if z > 0.0 { z } else { f32::MIN }).collect();
-    let near: Vec<f32> = scene.scan.smooth.iter().map(|&z| if z > 0.0 { z } else { f32::MAX }).collect();
-    let (high, low) = (scene.grid.window(&far, 2, f32::max), scene.grid.window(&near, 2, f32::min));
-    let hole: Vec<bool> = scene.scan.smooth.iter().map(|&z| z <= 0.0).collect();
-    let beside_hole = scene.grid.dilate(&hole, 1);
-    let focal = scene.scan.intrinsics.fx as f32;
+/// Whether a pixel is next to a step in depth that the slope of its own surface does not explain, or next to a hole.
+fn is_jump(scene: &Scene, normals: &[Vec3], index: usize) -> bool {
+    let smooth = &scene.scan.smooth;
+    if around(scene.grid, smooth, index, 1).any(|z| z <= 0.0) {
+        return true;
+    }
+    let measured = around(scene.grid, smooth, index, 2).filter(|z| *z > 0.0);
+    let (low, high) = measured.fold((f32::MAX, f32::MIN), |(low, high), z| (low.min(z), high.max(z)));
+    let z = smooth[index];
     let eye = scene.camera.translation.as_vec3();
-    let is_jump = |index: usize| {
-        if !scene.rising[index] {
-            return false;
-        }
-        let z = scene.scan.smooth[index];
-        let cosine = normals[index].dot((eye - scene.point[index]).normalize_or_zero()).clamp(0.2, 1.0);
-        let slope = (1.0 - cosine * cosine).sqrt() / cosine;
-        let expected = 4.0 * z / focal * slope;
-        let limit = 0.005 + 0.004 * z + 1.3 * expected + 1.5 * noise_m(scene, index);
-        beside_hole[index] || high[index] - low[index] > limit
-    };
-    scene.grid.map(is_jump)
+    let cosine = normals[index].dot((eye - scene.point[index]).normalize_or_zero()).clamp(0.2, 1.0);
+    let slope = (1.0 - cosine * cosine).sqrt() / cosine;
+    let expected = 4.0 * z / scene.scan.intrinsics.fx as f32 * slope;
+    high - low > 0.005 + 0.004 * z + 1.3 * expected + 1.5 * noise_m(scene, index)
+}
+
+/// The values in the square of half width `reach` round a pixel.
+fn around(grid: Grid, values: &[f32], index: usize, reach: usize) -> impl Iterator<Item = f32> + '_ {
+    let (column, row) = (grid.column(index), grid.row(index));
+    let columns = column.saturating_sub(reach)..(column + reach + 1).min(grid.width);
+    let rows = row.saturating_sub(reach)..(row + reach + 1).min(grid.height);
+    rows.flat_map(move |row| values[row * grid.width..][columns.clone()].iter().copied())
 }
 
 /// Pixels at which the surface bends inwards, in a row or in a column.
-fn bends(scene: &Scene, normals: &[Vec3]) -> Vec<bool> {
+fn bends(scene: &Scene, open: &[bool], normals: &[Vec3]) -> Vec<bool> {
     let step = BEND_STEP as isize;
     let focal = scene.scan.intrinsics.fx as f32;
     // Error of a normal's slope: the noise over the width that it was taken from.
@@ -153,15 +161,15 @@ fn bends(scene: &Scene, normals: &[Vec3]) -> Vec<bool> {
         let turn = (nb - na).dot(across) / (length + 1e-9);
         turn < -0.3 - 1.5 * (slope_sigma(index) - 0.2).max(0.0) && na.dot(nb) < 0.88 && length < 0.06
     };
-    scene.grid.map(|i| scene.rising[i] && (inwards(i, 1, 0) || inwards(i, 0, 1)))
+    scene.grid.map(|i| open[i] && (inwards(i, 1, 0) || inwards(i, 0, 1)))
 }
 
 /// Gives unlabelled pixels of standing things to the segment that reaches them first, within `reach_px` steps and
 /// 2 cm of where it began.
-fn grow(scene: &Scene, labels: &mut [u32], reach_px: usize) {
+fn grow(scene: &Scene, open: &[bool], labels: &mut [u32], reach_px: usize) {
     let mut front: Vec<(usize, usize)> = Vec::new();
     for index in 0..labels.len() {
-        if labels[index] != NONE && scene.grid.neighbours(index).any(|n| labels[n] == NONE && scene.rising[n]) {
+        if labels[index] != NONE && scene.grid.neighbours(index).any(|n| labels[n] == NONE && open[n]) {
             front.push((index, index));
         }
     }
@@ -171,7 +179,7 @@ fn grow(scene: &Scene, labels: &mut [u32], reach_px: usize) {
             for neighbour in scene.grid.neighbours(index) {
                 let step = scene.point[neighbour].distance(scene.point[index]);
                 let near = scene.point[neighbour].distance(scene.point[seed]) < 0.02 && step < 0.015;
-                if labels[neighbour] == NONE && scene.rising[neighbour] && near {
+                if labels[neighbour] == NONE && open[neighbour] && near {
                     labels[neighbour] = labels[index];
                     next.push((neighbour, seed));
                 }
@@ -183,8 +191,8 @@ fn grow(scene: &Scene, labels: &mut [u32], reach_px: usize) {
 
 /// Connected rests that no core was found in: those that touch a segment are part of it, the others, small or thin
 /// things, become segments of their own.
-fn adopt_remains(scene: &Scene, segments: &mut Segments) {
-    let rest: Vec<bool> = (0..scene.grid.len()).map(|i| scene.rising[i] && segments.labels[i] == NONE).collect();
+fn adopt_remains(scene: &Scene, open: &[bool], segments: &mut Segments) {
+    let rest: Vec<bool> = (0..scene.grid.len()).map(|i| open[i] && segments.labels[i] == NONE).collect();
     let joined = |a: usize, b: usize| (scene.scan.smooth[a] - scene.scan.smooth[b]).abs() < 0.012;
     let (labels, sizes) = scene.grid.components(&rest, joined);
     let mut touches: BTreeMap<u32, BTreeMap<u32, usize>> = BTreeMap::new();

@@ -101,7 +101,7 @@ impl Coarse {
         let inlier = |&cell: &u32| cell != u32::MAX && self.is_inlier(plane, cell as usize);
         // Grown by one cell, so that lines of holes do not cut a table into pieces.
         let mask: Vec<bool> = self.cells.iter().map(inlier).collect();
-        let (labels, _) = self.grid.components(&self.grid.dilate(&mask, 1), |_, _| true);
+        let (labels, _) = self.grid.blobs(&self.grid.dilate(&mask, 1));
         let count = labels.iter().filter(|l| **l != u32::MAX).max().map_or(0, |l| *l as usize + 1);
         let mut sizes = vec![0usize; count];
         for cell in (0..mask.len()).filter(|&c| mask[c]) {

@@ -61,7 +61,7 @@ impl Changed {
     fn group(&mut self, views: &[View; 2]) {
         let mut groups = Vec::new();
         for (frame, (mask, view)) in self.masks.iter_mut().zip(views).enumerate() {
-            let (labels, sizes) = view.grid().components(mask, |_, _| true);
+            let (labels, sizes) = view.grid().blobs(mask);
             let mut own: Vec<Vec<usize>> = sizes.iter().map(|size| Vec::with_capacity(*size)).collect();
             for (pixel, label) in labels.iter().enumerate().filter(|(_, label)| **label != u32::MAX) {
                 own[*label as usize].push(pixel);

@@ -81,6 +81,11 @@ impl<'a> Aid<'a> {
         Aid { with: None, calls: Vec::new(), given_up: Vec::new() }
     }
 
+    /// Whether there is nobody to ask.
+    pub fn is_none(&self) -> bool {
+        self.with.is_none()
+    }
+
     /// Whom to ask, if there is anybody, and a request with a number of its own.
     fn request(&self) -> Option<(&'a Tools, Request<'a>)> {
         let (assisted, frame) = self.with?;
@@ -221,9 +226,7 @@ fn lay(scene: &Scene, masks: &[Mask], beside: bool, segments: &mut Segments) -> 
         segments.count = 0;
     }
     for thing in &things {
-        let label = segments.count as u32;
-        thing.iter().for_each(|&pixel| segments.labels[pixel] = label);
-        segments.count += 1;
+        segments.lay(thing);
     }
     // What is left of a segment that a mask cut into may be a sliver.
     let kept: Vec<bool> = segments.pixels().iter().map(|pixels| pixels.len() >= scene.config.min_segment_px).collect();

@@ -3,8 +3,9 @@
 use crate::{
     fit::{Base, Evidence},
     hypotheses::Hypothesis,
+    scene::Scene,
 };
-use acm_concept::solid::PlacedSolid;
+use acm_concept::{pose::Pose, solid::PlacedSolid};
 use glam::{DVec2, DVec3};
 
 /// Things that were grounded already, as solids in the support frame.
@@ -14,7 +15,7 @@ pub(super) struct Bodies {
 }
 
 /// A segment whose lowest points are higher than this does not visibly reach the plane.
-const OFF_THE_PLANE_M: f64 = 0.022;
+pub(super) const OFF_THE_PLANE_M: f64 = 0.022;
 /// How well the bottom of a thing meets the top of what carries it.
 const MEETS_M: f64 = 0.015;
 
@@ -24,6 +25,17 @@ impl Bodies {
         let solids = best.model.solids(&best.minimum.state);
         let top = solids.iter().map(|s| s.pose.translation.z + s.half_extents().z).fold(0.0, f64::max);
         self.tops.push((solids, top));
+    }
+
+    /// Something flat that memory knows, with its solids in the world: it lies on the plane, wherever that is found.
+    pub fn add_lying(&mut self, scene: &Scene, solids: &[PlacedSolid]) {
+        let from_world = scene.world.inverse();
+        let place = |s: &PlacedSolid| PlacedSolid { solid: s.solid, pose: from_world * s.pose };
+        let placed: Vec<PlacedSolid> = solids.iter().map(place).collect();
+        let top = placed.iter().map(|s| 2.0 * s.half_extents().z).fold(0.0, f64::max);
+        let lift = top - placed.iter().map(|s| s.pose.translation.z + s.half_extents().z).fold(0.0, f64::max);
+        let lifted = |s: PlacedSolid| PlacedSolid { pose: Pose::from_translation(DVec3::Z * lift) * s.pose, ..s };
+        self.tops.push((placed.into_iter().map(lifted).collect(), top));
     }
 
     /// The surface under a segment with the given plan and lowest height.

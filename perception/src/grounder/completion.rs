@@ -7,6 +7,7 @@ use acm_concept::{
     pose::Pose,
     template::{SeenBy, TemplateLibrary},
 };
+use rayon::prelude::*;
 
 /// A measured depth agrees with the predicted one within this, and so many standard deviations of the noise.
 const AGREES_M: f64 = 0.004;
@@ -25,9 +26,13 @@ pub(super) fn complete(scene: &Scene, camera_pose: &Pose, library: &TemplateLibr
         }
     }
     let mut nearest: Vec<Option<(usize, f64)>> = vec![None; scene.grid.len()];
-    for (at, object) in objects.iter().enumerate().filter(|(_, object)| stands(object, library)) {
-        let solids = expected::solids(&object.parts, library);
-        for (pixel, depth) in raster::cast(&scene.scan.intrinsics, scene.grid, camera_pose, &solids).hits {
+    let cast = |object: &GroundedObject| {
+        let solids = if stands(object, library) { expected::solids(&object.parts, library) } else { Vec::new() };
+        raster::cast(&scene.scan.intrinsics, scene.grid, camera_pose, &solids).hits
+    };
+    let casts: Vec<Vec<(usize, f64)>> = objects.par_iter().map(cast).collect();
+    for (at, hits) in casts.into_iter().enumerate() {
+        for (pixel, depth) in hits {
             if nearest[pixel].is_none_or(|(_, other)| depth < other) {
                 nearest[pixel] = Some((at, depth));
             }
@@ -41,23 +46,27 @@ pub(super) fn complete(scene: &Scene, camera_pose: &Pose, library: &TemplateLibr
         let tolerance = AGREES_M + AGREES_SIGMAS * scene.noise_ratio * scene.config.depth_sigma_m(depth);
         measured <= 0.0 || (measured - depth).abs() < tolerance
     };
-    for (at, object) in objects.iter_mut().enumerate() {
-        let own = object.support.indices();
-        let mut mask = vec![false; scene.grid.len()];
-        own.iter().for_each(|&pixel| mask[pixel] = true);
-        let mut front = own;
+    let mut added = Vec::with_capacity(objects.len());
+    for (at, object) in objects.iter().enumerate() {
+        let (mut front, mut more) = (object.support.indices(), Vec::new());
         while let Some(pixel) = front.pop() {
             for next in scene.grid.neighbours(pixel) {
-                if !mask[next] && owner[next].is_none() && explains(next, at) {
-                    (mask[next], owner[next]) = (true, Some(at));
+                if owner[next].is_none() && explains(next, at) {
+                    owner[next] = Some(at);
                     front.push(next);
+                    more.push(next);
                 }
             }
         }
+        added.push(more);
+    }
+    objects.par_iter_mut().zip(added).filter(|(_, more)| !more.is_empty()).for_each(|(object, more)| {
+        let mut mask = vec![false; scene.grid.len()];
+        object.support.indices().into_iter().chain(more).for_each(|pixel| mask[pixel] = true);
         if let Some(support) = PixelSupport::from_mask(&mask, scene.grid.width) {
             object.support = support;
         }
-    }
+    });
 }
 
 fn stands(object: &GroundedObject, library: &TemplateLibrary) -> bool {

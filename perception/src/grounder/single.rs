@@ -1,6 +1,6 @@
 //! One step of the pipeline by itself: the masks of a frame, and what one mask is. The geometric tools are made of this.
 
-use super::{Grounder, assemble, bases::Bodies, beliefs, rank_on};
+use super::{Grounder, assemble, bases::Bodies, beliefs, explained::Explained, rank_on};
 use crate::{
     expected::Remembered,
     fit::Evidence,
@@ -44,7 +44,7 @@ impl Grounder {
         let cut = |scene: &Scene, support: &SupportPlane| {
             let remembered = Remembered::cast(scene, &frame.header.camera_pose, support, &expectation, &self.library);
             let context = self.context(nouns, &self.library);
-            let segments = self.segments(scene, context, &remembered);
+            let segments = self.segments(scene, context, &remembered, &mut Vec::new());
             let mask = |pixels: Vec<usize>| {
                 let evidence = Evidence::of_segment(scene, &segments, &pixels);
                 let support = support_of(scene, &pixels)?;
@@ -109,15 +109,31 @@ impl Grounder {
         Context { library, config: &self.config, nouns, lying: true, displaced: &[], remembered: None }
     }
 
-    /// What stands on the plane, cut into things and put together again where two pieces are one.
-    pub(super) fn segments(&self, scene: &Scene, unremembered: Context, remembered: &Remembered) -> Segments {
-        let mut segments = segments::split(scene);
+    /// What stands on the plane, cut into things and put together again where two pieces are one. What is explained is a
+    /// segment already, and no longer explained where a piece that is left beside it belongs to it.
+    pub(super) fn segments(
+        &self,
+        scene: &Scene,
+        unremembered: Context,
+        remembered: &Remembered,
+        explained: &mut Vec<Explained>,
+    ) -> Segments {
+        let mut open = scene.rising.clone();
+        explained.iter().flat_map(|thing| &thing.pixels).for_each(|&pixel| open[pixel] = false);
+        let mut segments = segments::split(scene, &open);
         crate::expected::split(scene, remembered, &mut segments);
         crate::expected::merge(remembered, &mut segments);
-        // What is hollow or cut in two is told by upright solids alone: they are many, and most are refused.
-        let upright = Context { lying: false, displaced: &[], ..unremembered };
-        joins::join(scene, &mut segments, upright);
-        parting::part(scene, &mut segments, upright);
+        let first = segments.count as u32;
+        explained.iter_mut().for_each(|thing| thing.label = segments.lay(&thing.pixels));
+        if first > 0 {
+            let known = first..segments.count as u32;
+            // What is hollow or cut in two is told by upright solids alone: they are many, and most are refused.
+            let upright = Context { lying: false, displaced: &[], ..unremembered };
+            joins::join(scene, &mut segments, upright, known.clone());
+            parting::part(scene, &mut segments, upright, known);
+            let pixels = segments.pixels();
+            explained.retain(|thing| pixels[thing.label as usize].len() == thing.pixels.len());
+        }
         segments
     }
 }

@@ -197,7 +197,7 @@ fn least_squares(points: &[DVec3]) -> Option<(DVec3, DVec3)> {
 /// A mask with the holes filled that do not reach the border of the grid and all of whose pixels `may` be filled.
 pub(super) fn filled(grid: Grid, mask: &[bool], may: impl Fn(usize) -> bool) -> Vec<bool> {
     let outside: Vec<bool> = mask.iter().map(|set| !set).collect();
-    let (labels, sizes) = grid.components(&outside, |_, _| true);
+    let (labels, sizes) = grid.blobs(&outside);
     let mut open = vec![0usize; sizes.len()];
     let mut border = vec![false; sizes.len()];
     for (index, &label) in labels.iter().enumerate() {

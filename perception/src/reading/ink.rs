@@ -218,7 +218,7 @@ fn strongest(pixels: &[usize], lab: impl Fn(usize) -> [f32; 3], ground: [f32; 3]
 
 /// The pixels of each connected piece of a mask.
 fn lists(grid: Grid, mask: &[bool]) -> Vec<Vec<usize>> {
-    let (labels, sizes) = grid.components(mask, |_, _| true);
+    let (labels, sizes) = grid.blobs(mask);
     let mut lists: Vec<Vec<usize>> = sizes.iter().map(|&size| Vec::with_capacity(size)).collect();
     for (at, &label) in labels.iter().enumerate() {
         if let Some(list) = lists.get_mut(label as usize) {
