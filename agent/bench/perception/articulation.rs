@@ -81,9 +81,9 @@ pub fn measure(args: &PerceptionArgs, result: &mut BenchResult) -> anyhow::Resul
                     .with_context(|| format!("{file}, seed {seed}"))?;
                 let name = format!("{} {seed}", short(file));
                 match drawn {
-                    Drawn::Hidden(joints) => tally.hide(joints),
-                    Drawn::Trial(trial, hidden) => {
-                        tally.hide(hidden);
+                    Drawn::ShutIn(joints) => tally.pass_over(joints),
+                    Drawn::Trial(trial, shut_in) => {
+                        tally.pass_over(shut_in);
                         let [before, after] = &trial.frames;
                         let answer = moved_parts(before, after, &Asked::default(), &GrounderConfig::default());
                         let scored = score::score(&trial, &answer);
@@ -103,10 +103,11 @@ pub fn measure(args: &PerceptionArgs, result: &mut BenchResult) -> anyhow::Resul
         result.figure(name, value);
     }
     result.notes.push(format!(
-        "Articulation: of {} joints that were drawn {} were left out: their part shows fewer than {LEAST_PIXELS} pixels, or \
-         none when all is shut.",
-        pooled.asked() + pooled.hidden(),
-        pooled.hidden()
+        "Articulation: of {} joints the parts of {} show fewer than {LEAST_PIXELS} pixels: they count for part and joint, not \
+         for the axis. {} more were passed over: shut in, their parts would come out through closed doors.",
+        pooled.asked(),
+        pooled.hidden(),
+        pooled.shut_in()
     ));
     result.seeds = vec![first, first + (count as u64).saturating_sub(1)];
     Ok(())

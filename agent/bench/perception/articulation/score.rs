@@ -13,6 +13,8 @@ const WITHIN_M: f64 = 0.02;
 /// What became of one trial.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Scored {
+    /// Whether enough of the part shows to be asked for its axis.
+    pub shows: bool,
     /// Whether some part was told at all.
     pub told: bool,
     /// Intersection over union of its pixels in the frame that shows more of it.
@@ -45,6 +47,7 @@ impl Scored {
         let values = [
             ("hinge", flag(truth.is_hinge)),
             ("moved", truth.moved),
+            ("shows", flag(self.shows)),
             ("told", flag(self.told)),
             ("iou", self.iou),
             ("joint_right", flag(self.kind_right)),
@@ -65,7 +68,8 @@ fn within(deg: f64, metres: f64) -> bool {
 pub fn score(trial: &Trial, answer: &Result<Vec<MovedPart>, NotTold>) -> Scored {
     let truth = &trial.truth;
     let (origin, axis) = truth.seen;
-    let mut scored = Scored { bias: distance(truth, axis, Some(origin)), ..Scored::default() };
+    let mut scored =
+        Scored { shows: trial.shows, bias: distance(truth, axis, Some(origin)), ..Scored::default() };
     let Some((part, further)) = answer.as_ref().ok().and_then(|parts| parts.split_first()) else { return scored };
     let [before, after] = &trial.part;
     let shows = |pixels: &[bool]| pixels.iter().filter(|shown| **shown).count();
@@ -98,7 +102,7 @@ fn distance(truth: &Truth, axis: glam::DVec3, point: Option<glam::DVec3>) -> (f6
 #[derive(Debug, Clone, Default)]
 pub struct Tally {
     scored: Vec<Scored>,
-    hidden: usize,
+    shut_in: usize,
 }
 
 impl Tally {
@@ -106,26 +110,36 @@ impl Tally {
     pub fn add(&mut self, scored: &Scored) {
         self.scored.push(*scored);
     }
-    /// Adds joints whose parts do not show.
-    pub fn hide(&mut self, joints: usize) {
-        self.hidden += joints;
+    /// Adds joints that were passed over: their parts are shut in.
+    pub fn pass_over(&mut self, joints: usize) {
+        self.shut_in += joints;
     }
     /// Adds all of another one.
     pub fn join(&mut self, other: &Tally) {
         self.scored.extend(&other.scored);
-        self.hidden += other.hidden;
+        self.shut_in += other.shut_in;
     }
     /// Trials.
     pub fn asked(&self) -> usize {
         self.scored.len()
     }
-    /// Joints that were left out.
+    /// Joints that were passed over.
+    pub fn shut_in(&self) -> usize {
+        self.shut_in
+    }
+    /// Trials whose part shows too little to be asked for its axis.
     pub fn hidden(&self) -> usize {
-        self.hidden
+        self.scored.len() - self.showing().count()
     }
 
+    fn showing(&self) -> impl Iterator<Item = &Scored> {
+        self.scored.iter().filter(|scored| scored.shows)
+    }
     fn share(&self, holds: impl Fn(&Scored) -> bool) -> f64 {
         self.scored.iter().filter(|scored| holds(scored)).count() as f64 / self.scored.len().max(1) as f64
+    }
+    fn share_of_showing(&self, holds: impl Fn(&Scored) -> bool) -> f64 {
+        self.showing().filter(|scored| holds(scored)).count() as f64 / self.showing().count().max(1) as f64
     }
 
     /// The figures, by the names of the targets; none without a trial.
@@ -135,7 +149,7 @@ impl Tally {
         }
         vec![
             ("articulation_part_and_joint", self.share(Scored::part_and_joint)),
-            ("articulation_axis", self.share(Scored::axis)),
+            ("articulation_axis", self.share_of_showing(Scored::axis)),
         ]
     }
 
@@ -143,13 +157,14 @@ impl Tally {
     pub fn row(&self, name: String) -> Row {
         let more = [
             ("trials", self.scored.len() as f64),
-            ("left_out", self.hidden as f64),
+            ("hidden", self.hidden() as f64),
+            ("passed_over", self.shut_in as f64),
             ("not_told", self.share(|scored| !scored.told)),
             ("part_found", self.share(|scored| scored.told && scored.iou >= FOUND_IOU)),
             ("joint_right", self.share(|scored| scored.kind_right)),
-            ("axis_of_a_perfect_reading", self.share(|scored| within(scored.bias.0, scored.bias.1))),
+            ("axis_of_a_perfect_reading", self.share_of_showing(|scored| within(scored.bias.0, scored.bias.1))),
             ("further_parts", self.scored.iter().map(|scored| scored.further as f64).sum()),
-            ("axis_within_2_sigma", self.share(|scored| scored.axis() && scored.sigmas.iter().all(|off| *off <= 2.0))),
+            ("axis_within_2_sigma", self.share_of_showing(|scored| scored.axis() && scored.sigmas.iter().all(|off| *off <= 2.0))),
         ];
         Row::new(name, self.figures().into_iter().chain(more))
     }

@@ -33,7 +33,7 @@ fn trial() -> Trial {
         moved: 0.5,
         seen: (DVec3::X * 1.01, DVec3::Z),
     };
-    Trial { frames: [frame.clone(), frame], part, truth }
+    Trial { frames: [frame.clone(), frame], part, shows: true, truth }
 }
 
 fn answer(joint: JointModel, pixels: usize) -> Result<Vec<MovedPart>, NotTold> {
@@ -67,6 +67,16 @@ fn answers_are_scored_against_the_truth() {
 }
 
 #[test]
+fn a_part_that_hardly_shows_counts_for_its_joint_and_not_for_its_axis() {
+    let mut tally = Tally::default();
+    tally.add(&score(&trial(), &answer(hinge(1.0, 0.0), 200)));
+    tally.add(&score(&Trial { shows: false, ..trial() }, &Err(NotTold::NothingMoved)));
+    let figures = tally.figures();
+    assert_eq!(figures, [("articulation_part_and_joint", 0.5), ("articulation_axis", 1.0)]);
+    assert_eq!((tally.asked(), tally.hidden()), (2, 1));
+}
+
+#[test]
 fn a_perfect_reading_has_the_cameras_errors() {
     let scored = score(&trial(), &Err(NotTold::NothingMoved));
     assert!(scored.bias.0 < 1e-6 && (scored.bias.1 - 0.01).abs() < 1e-9, "{:?}", scored.bias);
@@ -84,12 +94,12 @@ fn a_thing_of_the_shared_data_is_drawn_with_its_truth() {
     let thing = Mechanism::load(&family.things[0]).unwrap();
     let mut drawn = || match draw(&mut renderer, family, &thing, 7).unwrap() {
         Drawn::Trial(trial, _) => *trial,
-        Drawn::Hidden(joints) => panic!("all of {joints} joints are hidden"),
+        Drawn::ShutIn(joints) => panic!("all of {joints} joints are shut in"),
     };
     let (one, same) = (drawn(), drawn());
     assert_eq!((&one.frames, &one.part, &one.truth), (&same.frames, &same.part, &same.truth), "a seed is a trial");
     let shown = one.part.iter().map(|pixels| pixels.iter().filter(|shown| **shown).count()).max().unwrap();
-    assert!(shown >= LEAST_PIXELS && one.truth.moved.abs() > 0.03);
+    assert!((shown >= LEAST_PIXELS) == one.shows && one.truth.moved.abs() > 0.03);
     // What the camera's errors do to the axis is little beside the thing.
     assert!(one.truth.seen.0.distance(one.truth.origin) < 0.08);
 }

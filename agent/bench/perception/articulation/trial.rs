@@ -17,7 +17,7 @@ use std::{f64::consts::PI, sync::Arc};
 
 /// The two states are at least so far apart, radians or metres; a joint that cannot do that is not asked for.
 const APART: [f64; 2] = [15.0 * PI / 180.0, 0.04];
-/// A part that shows fewer pixels in the state that shows more of it is left out.
+/// The axis is not asked of a part that shows fewer pixels in the state that shows more of it.
 pub const LEAST_PIXELS: usize = 200;
 /// How far the camera stands from what it looks at, metres, and its angles from the thing's front.
 const DISTANCE_M: [f64; 2] = [0.8, 1.5];
@@ -46,6 +46,8 @@ pub struct Trial {
     pub frames: [RgbdFrame; 2],
     /// Which pixels of each truly show the moved part.
     pub part: [Vec<bool>; 2],
+    /// Whether one of the two shows enough of it to tell its axis.
+    pub shows: bool,
     /// The joint as it truly is, in the world.
     pub truth: Truth,
 }
@@ -70,13 +72,13 @@ pub struct Truth {
 /// What came of drawing a trial.
 #[derive(Debug)]
 pub enum Drawn {
-    /// One to be judged, and how many joints were drawn before it whose part does not show.
+    /// One to be judged, and how many joints were drawn before it that nobody can move: their part is shut in.
     Trial(Box<Trial>, usize),
-    /// None of so many joints has a part that shows.
-    Hidden(usize),
+    /// All of so many joints have a part that is shut in.
+    ShutIn(usize),
 }
 
-/// Draws the trial of a seed: the first joint, in random order, whose part shows.
+/// Draws the trial of a seed: the first joint, in random order, whose part is not shut in.
 ///
 /// # Errors
 /// The renderer fails.
@@ -86,7 +88,7 @@ pub fn draw(renderer: &mut Renderer, family: &Family, thing: &Mechanism, seed: u
         thing.joints().into_iter().filter_map(|joint| Some((reach(&joint)?, joint))).map(|(r, j)| (j, r)).collect();
     joints.shuffle(&mut rng);
     let count = joints.len();
-    for (hidden, (joint, range)) in joints.into_iter().enumerate() {
+    for (shut_in, (joint, range)) in joints.into_iter().enumerate() {
         let least = APART[usize::from(!joint.is_hinge)];
         let states = loop {
             let states = [(); 2].map(|()| rng.random_range(range[0]..=range[1]));
@@ -95,10 +97,10 @@ pub fn draw(renderer: &mut Renderer, family: &Family, thing: &Mechanism, seed: u
             }
         };
         if let Some(trial) = look(renderer, family, thing, &joint, states, &mut rng, seed)? {
-            return Ok(Drawn::Trial(Box::new(trial), hidden));
+            return Ok(Drawn::Trial(Box::new(trial), shut_in));
         }
     }
-    Ok(Drawn::Hidden(count))
+    Ok(Drawn::ShutIn(count))
 }
 
 /// The positions that a joint can take, if two of them are far enough apart.
@@ -145,8 +147,9 @@ fn look(
     };
     let part = [shown(&rendered[0]), shown(&rendered[1])];
     let few = |pixels: &[bool]| pixels.iter().filter(|shown| **shown).count() < LEAST_PIXELS;
-    // What does not show when all is shut is inside, and comes out through closed doors.
-    if few(&shown(&shut)) || part.iter().all(|pixels| few(pixels)) {
+    let shows = !part.iter().all(|pixels| few(pixels));
+    // What shows, but not when all is shut, is inside, and comes out through closed doors.
+    if few(&shown(&shut)) && shows {
         return Ok(None);
     }
     let mut frame = |number: usize| -> anyhow::Result<RgbdFrame> {
@@ -170,7 +173,7 @@ fn look(
     };
     let seen = (seen(origin), (seen(origin + axis) - seen(origin)).normalize());
     let truth = Truth { name: joint.name.clone(), is_hinge: joint.is_hinge, origin, axis, moved, seen };
-    Ok(Some(Trial { frames, part, truth }))
+    Ok(Some(Trial { frames, part, shows, truth }))
 }
 
 /// A camera before the thing's front that looks at a place between its middle and that of its part.
