@@ -67,9 +67,17 @@ pub struct GrounderConfig {
     /// Error of heights as a share of them.
     pub size_sigma_share: f64,
     /// Error of an extent between walls, which lean and are rounded at their edges, as a share of how far the outline
-    /// misses the fitted one.
+    /// misses the fitted one, beyond what noise leaves.
     pub size_sigma_walls: f64,
-    /// The same of the height of a top, which depth shows too.
+    /// Pixels by which noise lets the outline miss the fitted one.
+    pub size_outline_px: f64,
+    /// The same error per standard deviation by which the surface misses the fitted one, beyond what noise leaves.
+    pub size_sigma_surface_m: f64,
+    /// Standard deviations by which noise lets the surface miss the fitted one.
+    pub size_surface: f64,
+    /// The same error as a share of how much the walls lean.
+    pub size_sigma_lean: f64,
+    /// Error of the height of a top, which depth shows too, as a share of how far the outline misses the fitted one.
     pub size_sigma_top: f64,
     /// Whether digits, marks, lamps and needles are read from the faces of things: it takes some milliseconds a thing.
     pub read: bool,
@@ -109,8 +117,12 @@ impl Default for GrounderConfig {
             sigma_range: 0.005,
             size_sigma_floor_m: 0.00045,
             size_sigma_share: 0.004,
-            size_sigma_walls: 1.5,
-            size_sigma_top: 0.3,
+            size_sigma_walls: 3.0,
+            size_outline_px: 0.6,
+            size_sigma_surface_m: 0.01,
+            size_surface: 0.5,
+            size_sigma_lean: 0.7,
+            size_sigma_top: 0.2,
             read: false,
             min_confidence: 0.15,
         }
@@ -143,6 +155,10 @@ impl GrounderConfig {
             ("sigma_floor_m", self.sigma_floor_m),
             ("size_sigma_floor_m", self.size_sigma_floor_m),
             ("size_sigma_walls", self.size_sigma_walls),
+            ("size_outline_px", self.size_outline_px),
+            ("size_sigma_surface_m", self.size_sigma_surface_m),
+            ("size_surface", self.size_surface),
+            ("size_sigma_lean", self.size_sigma_lean),
             ("size_sigma_top", self.size_sigma_top),
         ];
         let shares = [

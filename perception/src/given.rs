@@ -61,7 +61,7 @@ pub fn things(
     let own = vec![false; scan.grid.len()];
     let up = frame.header.camera_pose.rotation.inverse() * DVec3::Z;
     let upright = Upright { up, max_angle_rad: config.max_support_tilt_rad };
-    let plane = support::find(&scan, &own, upright, config).ok_or(Blindness::NoSupport)?;
+    let plane = support::find(&scan, &own, upright, None, config).ok_or(Blindness::NoSupport)?;
     let scene = Scene::new(&scan, &plane, &frame.header.camera_pose, own, config);
     let name = |pixel: usize| match labels.get(pixel) {
         // Where nothing was measured nothing belongs to a segment, as in the pipeline.

@@ -120,8 +120,9 @@ impl Grounder {
         let own = own::pixels(&scan, &frame.header.camera_pose, &expectation.robot, &self.config);
         let up = frame.header.camera_pose.rotation.inverse() * DVec3::Z;
         let upright = Upright { up, max_angle_rad: self.config.max_support_tilt_rad };
-        let plane =
-            support::find(&scan, &own, upright, &self.config).ok_or((Blindness::NoSupport, scan.depth_fraction))?;
+        let known = expectation.support.map(|support| Plane::of(&support, &frame.header.camera_pose));
+        let plane = support::find(&scan, &own, upright, known, &self.config)
+            .ok_or((Blindness::NoSupport, scan.depth_fraction))?;
         let scene = Scene::new(&scan, &plane, &frame.header.camera_pose, own, &self.config);
         let support = support_plane(&scene, &plane);
         Ok(read(&scene, &support))
@@ -160,8 +161,7 @@ impl Grounder {
             remembered: None,
         };
         // A tool that segments is asked about all that stands there.
-        let mut explained =
-            if aid.is_none() { explained::find(scene, unremembered, remembered) } else { Vec::new() };
+        let mut explained = if aid.is_none() { explained::find(scene, unremembered, remembered) } else { Vec::new() };
         let mut segments = self.segments(scene, unremembered, remembered, &mut explained);
         aid.cut(scene, &expectation.nouns, &mut segments);
         let standing: Vec<bool> = segments.labels.iter().map(|label| *label != NONE).collect();

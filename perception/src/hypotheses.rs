@@ -3,12 +3,15 @@
 
 pub(crate) mod advised;
 pub(crate) mod given;
+mod misfit;
 mod tipped;
+
+pub(crate) use misfit::Misfit;
 
 use crate::{
     config::GrounderConfig,
     expected::{Known, solids},
-    fit::{Base, Evidence, Minimum, Model, OutlineKind, approach, cost, minimise, rough_cost},
+    fit::{Base, Evidence, Minimum, Model, approach, cost, minimise, rough_cost},
     measure::{self, Rectangle},
 };
 use acm_concept::{
@@ -135,11 +138,7 @@ pub(crate) fn rank<'a>(context: Context<'a>, measured: &Measured, evidence: &Evi
 
 /// What memory knows and what explains the evidence as well as noise lets anything do, fitted from where it is expected:
 /// no other template is tried. Of what is settled only the place is fitted.
-pub(crate) fn recognise<'a>(
-    context: Context<'a>,
-    measured: &Measured,
-    evidence: &Evidence,
-) -> Option<Hypothesis<'a>> {
+pub(crate) fn recognise<'a>(context: Context<'a>, measured: &Measured, evidence: &Evidence) -> Option<Hypothesis<'a>> {
     // What is not settled must be seen whole: of what is cut off the ranking decides whether memory's sizes are taken over.
     let whole = evidence.cut_share() <= TRACKED_CUT;
     let Known { part, settled } = context.remembered.filter(|known| known.settled || whole)?;
@@ -342,50 +341,6 @@ fn score(context: Context, model: &Model, minimum: &Minimum, evidence: &Evidence
         score += context.config.memory_boost.ln();
     }
     score
-}
-
-/// An outline point that is farther off is an error of its own.
-const GROSS_PX: f64 = 6.0;
-/// A residual up to this many standard deviations counts as explained.
-const EXPLAINED: f64 = 3.0;
-/// So is an outline point up to this many pixels, however sharp the edge.
-const EXPLAINED_PX: f64 = 4.5;
-
-impl Hypothesis<'_> {
-    /// Share of the evidence that the fit explains: of the surface points, and of the outline points that are the
-    /// thing's own.
-    pub fn explained(&self, evidence: &Evidence) -> (f64, f64) {
-        let mut residuals = Vec::new();
-        self.model.residuals(&self.minimum.state, evidence, &mut residuals);
-        let (points, outline) = residuals.split_at(evidence.points.len().min(residuals.len()));
-        let share = |good: usize, all: usize| if all == 0 { 1.0 } else { good as f64 / all as f64 };
-        let fits = |r: &&f64| r.abs() < EXPLAINED;
-        let own: Vec<bool> = outline
-            .iter()
-            .zip(&evidence.outline)
-            .filter(|(_, p)| p.kind == OutlineKind::Own)
-            .map(|(r, p)| r.abs() < EXPLAINED.max(EXPLAINED_PX / p.sigma_px))
-            .collect();
-        (
-            share(points.iter().filter(fits).count(), points.len()),
-            share(own.iter().filter(|fits| **fits).count(), own.len()),
-        )
-    }
-}
-
-impl Hypothesis<'_> {
-    /// How far the thing's own outline is from the fitted one, pixels: four fifths of its points are nearer, gross errors
-    /// left out.
-    pub fn outline_misfit_px(&self, evidence: &Evidence) -> f64 {
-        let mut residuals = Vec::new();
-        self.model.residuals(&self.minimum.state, evidence, &mut residuals);
-        let outline = residuals.into_iter().skip(evidence.points.len()).zip(&evidence.outline);
-        let own = outline.filter(|(_, point)| point.kind == OutlineKind::Own);
-        let off = own.map(|(residual, point)| residual.abs() * point.sigma_px);
-        let mut off: Vec<f64> = off.filter(|px| *px < GROSS_PX).collect();
-        off.sort_by(f64::total_cmp);
-        off.get(off.len() * 4 / 5).copied().unwrap_or(0.0)
-    }
 }
 
 /// Probabilities of the nouns under which the hypotheses are spoken of, best first.

@@ -103,8 +103,7 @@ pub(crate) fn join(scene: &Scene, segments: &mut Segments, context: Context, kno
     // Pairs that the costly tests refused: asked again only when one of them has changed.
     let mut refused: BTreeSet<(Relation, u32, u32)> = BTreeSet::new();
     for _ in 0..MAX_JOINS {
-        let Some((first, second, relation)) = related(scene, segments, context, &pieces, &known, &mut refused)
-        else {
+        let Some((first, second, relation)) = related(scene, segments, context, &pieces, &known, &mut refused) else {
             return;
         };
         let name = if relation == Relation::Artefact { NONE } else { first };
@@ -147,9 +146,8 @@ fn related(
     ];
     for relation in relations {
         let pairs = pieces.iter().flat_map(|a| pieces.iter().map(move |b| (a, b)));
-        let unlike = |(a, b): &(&Piece, &Piece)| {
-            a.label != b.label && !(known.contains(&a.label) && known.contains(&b.label))
-        };
+        let unlike =
+            |(a, b): &(&Piece, &Piece)| a.label != b.label && !(known.contains(&a.label) && known.contains(&b.label));
         for (a, b) in pairs.filter(unlike) {
             let key = (relation, a.label, b.label);
             if refused.contains(&key) {

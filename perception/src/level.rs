@@ -16,7 +16,7 @@ use glam::{DMat3, DQuat, DVec3};
 pub fn level(frame: &RgbdFrame, config: &GrounderConfig) -> Option<Pose> {
     let scan = Scan::read(frame, config).ok()?;
     let excluded = vec![false; scan.grid.len()];
-    let search = |up, max_angle_rad| support::find(&scan, &excluded, Upright { up, max_angle_rad }, config);
+    let search = |up, max_angle_rad| support::find(&scan, &excluded, Upright { up, max_angle_rad }, None, config);
     let plane = search(DVec3::NEG_Y, 75f64.to_radians()).or_else(|| search(DVec3::NEG_Z, 30f64.to_radians()))?;
     pose_over(&plane)
 }

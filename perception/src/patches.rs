@@ -36,6 +36,9 @@ const JOINT_LOSS: f64 = 0.02;
 /// What is lighter than the surface by this much (CIELAB) has another colour; what is darker may lie in the shade.
 const LIGHTER: f32 = 14.0;
 
+/// The bare surface's colour is fitted to every so many-th pixel: its few numbers need no more. Prime to usual widths.
+const SAMPLED: usize = 11;
+
 /// How a pixel counts in the search for patches.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Ground {
@@ -102,48 +105,52 @@ struct SurfaceTint {
     lightness: nalgebra::Vector3<f32>,
 }
 
+/// A pixel of the plane, as the planes over the image are fitted to it.
+struct Sample {
+    place: nalgebra::Vector3<f32>,
+    tint: Tint,
+    lightness: f32,
+}
+
 impl SurfaceTint {
     fn measure(scene: &Scene) -> Option<SurfaceTint> {
-        let pixels: Vec<usize> = (0..scene.grid.len()).step_by(5).filter(|&i| scene.in_plane[i]).collect();
-        let mode = mode(&pixels.iter().map(|&i| scene.scan.tint(i)).collect::<Vec<_>>())?;
+        let sample =
+            |i: usize| Sample { place: place(scene, i), tint: scene.scan.tint(i), lightness: scene.scan.lab[i][0] };
+        let samples: Vec<Sample> =
+            (0..scene.grid.len()).step_by(SAMPLED).filter(|&i| scene.in_plane[i]).map(sample).collect();
+        let mode = mode(&samples.iter().map(|sample| sample.tint).collect::<Vec<_>>())?;
         let constant = |value: f32| nalgebra::Vector3::new(value, 0.0, 0.0);
         let mut tint = SurfaceTint { coefficients: [constant(mode.a), constant(mode.b)], lightness: constant(0.0) };
         for _ in 0..3 {
             let (mut matrix, mut right) = (nalgebra::Matrix3::zeros(), [nalgebra::Vector3::zeros(); 2]);
-            for &pixel in &pixels {
-                let value = scene.scan.tint(pixel);
-                if value.distance(&tint.at(scene, pixel)) > 0.6 * scene.config.patch_contrast {
-                    continue;
-                }
-                let row = place(scene, pixel);
-                matrix += row * row.transpose();
-                right[0] += row * value.a;
-                right[1] += row * value.b;
+            for sample in samples.iter().filter(|sample| tint.is_bare(scene, sample)) {
+                matrix += sample.place * sample.place.transpose();
+                right[0] += sample.place * sample.tint.a;
+                right[1] += sample.place * sample.tint.b;
             }
             let inverse = (matrix + nalgebra::Matrix3::identity() * 10.0).try_inverse()?;
             let pull = |c: f32, sum| inverse * (sum + constant(10.0 * c));
             tint.coefficients = [pull(mode.a, right[0]), pull(mode.b, right[1])];
         }
-        tint.lightness = tint.lit(scene, &pixels)?;
+        tint.lightness = tint.lit(scene, &samples)?;
         Some(tint)
     }
+    fn is_bare(&self, scene: &Scene, sample: &Sample) -> bool {
+        sample.tint.distance(&self.tint_at(&sample.place)) <= 0.6 * scene.config.patch_contrast
+    }
     /// The lightness of the bare surface: the middle of all, then a plane through what is near it.
-    fn lit(&self, scene: &Scene, pixels: &[usize]) -> Option<nalgebra::Vector3<f32>> {
-        let bare = |pixel: &&usize| {
-            scene.scan.tint(**pixel).distance(&self.at(scene, **pixel)) < 0.6 * scene.config.patch_contrast
-        };
-        let bare: Vec<usize> = pixels.iter().filter(bare).copied().collect();
-        let mut values: Vec<f32> = bare.iter().map(|&pixel| scene.scan.lab[pixel][0]).collect();
+    fn lit(&self, scene: &Scene, samples: &[Sample]) -> Option<nalgebra::Vector3<f32>> {
+        let bare: Vec<&Sample> = samples.iter().filter(|sample| self.is_bare(scene, sample)).collect();
+        let mut values: Vec<f32> = bare.iter().map(|sample| sample.lightness).collect();
         values.sort_by(f32::total_cmp);
         let middle = values.get(values.len() / 2).copied()?;
         let mut plane = nalgebra::Vector3::new(middle, 0.0, 0.0);
         for _ in 0..3 {
             let (mut matrix, mut right) = (nalgebra::Matrix3::identity() * 10.0, plane * 10.0);
-            for &pixel in &bare {
-                let (row, value) = (place(scene, pixel), scene.scan.lab[pixel][0]);
-                if (value - plane.dot(&row)).abs() < 0.6 * LIGHTER {
-                    matrix += row * row.transpose();
-                    right += row * value;
+            for sample in &bare {
+                if (sample.lightness - plane.dot(&sample.place)).abs() < 0.6 * LIGHTER {
+                    matrix += sample.place * sample.place.transpose();
+                    right += sample.place * sample.lightness;
                 }
             }
             plane = matrix.try_inverse()? * right;
@@ -154,8 +161,10 @@ impl SurfaceTint {
         self.lightness.dot(&place(scene, pixel))
     }
     fn at(&self, scene: &Scene, pixel: usize) -> Tint {
-        let row = place(scene, pixel);
-        Tint { a: self.coefficients[0].dot(&row), b: self.coefficients[1].dot(&row) }
+        self.tint_at(&place(scene, pixel))
+    }
+    fn tint_at(&self, place: &nalgebra::Vector3<f32>) -> Tint {
+        Tint { a: self.coefficients[0].dot(place), b: self.coefficients[1].dot(place) }
     }
 }
 

@@ -21,8 +21,9 @@ pub(crate) struct Scene<'a> {
     pub noise_ratio: f64,
     /// Point of every pixel in the support frame, from the smoothed depth; NaN where there is none.
     pub point: Vec<Vec3>,
-    /// Height noise of the smoothed depth at every pixel, metres.
-    height_sigma_m: Vec<f32>,
+    /// How much a depth of 1 m along the viewing ray of a pixel adds to the height: for one at the image's origin, per
+    /// column, per row.
+    climb: [f32; 3],
     /// Pixels that belong to the robot itself.
     pub own: Vec<bool>,
     /// Pixels on the plane and within its extent.
@@ -46,7 +47,7 @@ impl<'a> Scene<'a> {
         let world = Pose::new(normal * offset, DQuat::from_rotation_arc(DVec3::Z, normal));
         let camera = world.inverse() * *camera_pose;
         let noise_ratio = plane.noise_ratio.clamp(0.25, 2.0);
-        let (point, height_sigma_m) = points(scan, &camera, noise_ratio as f32, config);
+        let (point, climb) = points(scan, &camera);
         let mut scene = Scene {
             scan,
             config,
@@ -55,7 +56,7 @@ impl<'a> Scene<'a> {
             world,
             noise_ratio,
             point,
-            height_sigma_m,
+            climb,
             own,
             in_plane: Vec::new(),
             rising: Vec::new(),
@@ -69,8 +70,11 @@ impl<'a> Scene<'a> {
     /// Height above which a pixel stands on the plane rather than in it. The share of the distance stands for the
     /// ripples of a structured-light or stereo camera, which no smoothing removes.
     pub fn height_limit_m(&self, pixel: usize) -> f32 {
-        let ripple = 0.006 * self.scan.smooth[pixel];
-        self.config.min_height_m.max(3.0 * self.height_sigma_m[pixel]).max(ripple)
+        let depth = self.scan.smooth[pixel];
+        let (column, row) = (self.grid.column(pixel) as f32, self.grid.row(pixel) as f32);
+        let climb = (self.climb[0] + self.climb[1] * column + self.climb[2] * row).abs();
+        let sigma_m = (self.noise_ratio * self.config.depth_sigma_m(f64::from(depth))) as f32 * climb;
+        self.config.min_height_m.max(3.0 * sigma_m).max(0.006 * depth)
     }
     /// Fewest pixels of a thing: the configured number is one of a VGA image.
     pub fn min_segment_px(&self) -> usize {
@@ -104,13 +108,15 @@ impl<'a> Scene<'a> {
     }
 
     fn find_surface(&mut self) {
-        let flat = |i: usize| !self.own[i] && self.is_known(i) && self.point[i].z.abs() <= self.height_limit_m(i);
+        // The limit is never lower than its floor, which most of the surface keeps.
+        let within = |i: usize, z: f32| z <= self.config.min_height_m || z <= self.height_limit_m(i);
+        let flat = |i: usize| !self.own[i] && self.is_known(i) && within(i, self.point[i].z.abs());
         let mask = self.grid.map(flat);
         // Opened against specks on walls and floors behind, closed over lines of holes.
         let solid = self.grid.dilate(&self.grid.erode(&mask, 1), 3);
         let (labels, sizes) = self.grid.blobs(&solid);
         let largest = (0..sizes.len()).max_by_key(|&l| (sizes[l], std::cmp::Reverse(l)));
-        self.in_plane = (0..mask.len()).map(|i| mask[i] && Some(labels[i] as usize) == largest).collect();
+        self.in_plane = self.grid.map(|i| mask[i] && Some(labels[i] as usize) == largest);
         // The plane's image is a projective map, which keeps lines straight: the ends of the rows hold the hull.
         let mut feet: Vec<DVec2> = Vec::new();
         for row in 0..self.grid.height {
@@ -122,20 +128,25 @@ impl<'a> Scene<'a> {
     }
 
     fn find_rising(&mut self) {
+        let extent = Outline::of(&self.outline);
         let rises = |i: usize| {
             let point = self.point[i];
             !self.own[i]
                 && self.is_known(i)
+                && point.z > self.config.min_height_m
                 && point.z > self.height_limit_m(i)
                 && point.z < self.config.max_height_m
-                && self.stands_inside(point.as_dvec3())
+                && self.stands_inside(&extent, point.as_dvec3())
         };
         self.rising = self.grid.map(rises);
     }
 
     /// Whether the foot of a point lies on the surface. Feet that the image does not show get some leave.
-    fn stands_inside(&self, point: DVec3) -> bool {
-        let outside = distance_outside(&self.outline, point.truncate());
+    fn stands_inside(&self, extent: &Outline, point: DVec3) -> bool {
+        if extent.holds(point.truncate()) {
+            return true;
+        }
+        let outside = extent.distance_outside(point.truncate());
         if outside <= 0.01 {
             return true;
         }
@@ -144,25 +155,21 @@ impl<'a> Scene<'a> {
     }
 }
 
-/// The point and the height noise of every pixel.
-fn points(scan: &Scan, camera: &Pose, noise_ratio: f32, config: &GrounderConfig) -> (Vec<Vec3>, Vec<f32>) {
-    let axes = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| camera.transform_vector(axis).as_vec3());
+/// The point of every pixel, and how viewing rays climb.
+fn points(scan: &Scan, camera: &Pose) -> (Vec<Vec3>, [f32; 3]) {
+    let axes = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| camera.transform_vector(axis));
     let eye = camera.translation.as_vec3();
-    let intrinsics = scan.intrinsics;
-    let ray = |index: usize| {
-        let x = ((scan.grid.column(index) as f64 - intrinsics.cx) / intrinsics.fx) as f32;
-        let y = ((scan.grid.row(index) as f64 - intrinsics.cy) / intrinsics.fy) as f32;
-        axes[0] * x + axes[1] * y + axes[2]
-    };
+    let of = scan.intrinsics;
+    let (across, down) = (axes[0] / of.fx, axes[1] / of.fy);
+    let first = (axes[2] - across * of.cx - down * of.cy).as_vec3();
+    let (across, down) = (across.as_vec3(), down.as_vec3());
     let point = |index: usize| match scan.smooth[index] {
-        depth if depth > 0.0 => eye + ray(index) * depth,
+        depth if depth > 0.0 => {
+            eye + (first + across * scan.grid.column(index) as f32 + down * scan.grid.row(index) as f32) * depth
+        }
         _ => Vec3::NAN,
     };
-    let sigma = |index: usize| match scan.smooth[index] {
-        depth if depth > 0.0 => noise_ratio * config.depth_sigma_m(f64::from(depth)) as f32 * ray(index).z.abs(),
-        _ => 0.0,
-    };
-    (scan.grid.map(point), scan.grid.map(sigma))
+    (scan.grid.map(point), [first.z, across.z, down.z])
 }
 
 /// The convex hull of points, counter-clockwise (Andrew's monotone chain); fewer than three points are returned as
@@ -193,11 +200,6 @@ pub(crate) fn convex_hull(mut points: Vec<DVec2>) -> Vec<DVec2> {
     hull
 }
 
-/// How far a point lies outside a convex polygon; negative inside (distance to the nearest edge).
-pub(crate) fn distance_outside(polygon: &[DVec2], point: DVec2) -> f64 {
-    Outline::of(polygon).distance_outside(point)
-}
-
 /// A convex polygon ready to be asked for many distances.
 pub(crate) struct Outline {
     /// Corner, unit vector to the next corner, and distance to it.
@@ -214,7 +216,17 @@ impl Outline {
         };
         Outline { edges: polygon.iter().enumerate().map(edge).collect() }
     }
-    /// As [`distance_outside`].
+    /// Whether a point lies within, told by few of the edges: the polygon is a fan of triangles round its first corner.
+    pub fn holds(&self, point: DVec2) -> bool {
+        let Some((first, _, _)) = self.edges.first().filter(|_| self.edges.len() > 2) else { return false };
+        let to = point - *first;
+        // The spokes that the point lies to the left of.
+        let spokes = &self.edges[1..];
+        let passed = spokes.partition_point(|(corner, _, _)| (*corner - *first).perp_dot(to) >= 0.0);
+        let Some((corner, along, _)) = passed.checked_sub(1).and_then(|at| spokes.get(at)) else { return false };
+        passed < spokes.len() && along.perp_dot(point - *corner) >= 0.0
+    }
+    /// How far a point lies outside; negative inside (distance to the nearest edge).
     pub fn distance_outside(&self, point: DVec2) -> f64 {
         let across = |(a, along, _): &(DVec2, DVec2, f64)| (point - *a).perp_dot(*along);
         let inside = self.edges.iter().map(across).fold(f64::NEG_INFINITY, f64::max);
@@ -245,7 +257,11 @@ mod tests {
                 prop_assert!((b - *a).perp_dot(c - b) > 0.0);
             }
             for point in points {
-                prop_assert!(distance_outside(&hull, point) <= 1e-9);
+                let (middle, outline) = (hull.iter().sum::<DVec2>() / hull.len() as f64, Outline::of(&hull));
+                let (near, far) = (middle.lerp(point, 0.999), middle + (point - middle) * 3.0);
+                prop_assert!(outline.holds(near) || outline.distance_outside(near) > -1e-9);
+                prop_assert!(!outline.holds(far) || outline.distance_outside(far) <= 1e-9);
+                prop_assert!(Outline::of(&hull).distance_outside(point) <= 1e-9);
             }
         }
     }
@@ -253,8 +269,8 @@ mod tests {
     #[test]
     fn the_distance_to_a_square_is_signed() {
         let square = convex_hull([(0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (0.0, 2.0)].map(DVec2::from).to_vec());
-        assert_eq!(distance_outside(&square, DVec2::new(1.0, 1.5)), -0.5);
-        assert_eq!(distance_outside(&square, DVec2::new(3.0, 1.0)), 1.0);
-        assert_eq!(distance_outside(&square, DVec2::new(5.0, 6.0)), 5.0);
+        assert_eq!(Outline::of(&square).distance_outside(DVec2::new(1.0, 1.5)), -0.5);
+        assert_eq!(Outline::of(&square).distance_outside(DVec2::new(3.0, 1.0)), 1.0);
+        assert_eq!(Outline::of(&square).distance_outside(DVec2::new(5.0, 6.0)), 5.0);
     }
 }

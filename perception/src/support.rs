@@ -1,6 +1,7 @@
 //! The support plane: seeded RANSAC over a sparse sample, the largest connected inlier patch, robust refinement.
 
 use crate::{config::GrounderConfig, grid::Grid, scan::Scan};
+use acm_concept::{object::SupportPlane, pose::Pose};
 use glam::DVec3;
 use nalgebra::{Matrix3, Vector3};
 use rand::{Rng, SeedableRng};
@@ -30,6 +31,12 @@ pub(crate) struct Plane {
 }
 
 impl Plane {
+    /// A remembered one, seen by a camera.
+    pub fn of(support: &SupportPlane, camera: &Pose) -> Plane {
+        let normal = camera.rotation.inverse() * support.normal;
+        let offset = support.offset_m - support.normal.dot(camera.translation);
+        Plane { normal, offset, residual_m: support.residual_m, noise_ratio: 1.0 }
+    }
     pub fn distance(&self, point: DVec3) -> f64 {
         self.normal.dot(point) - self.offset
     }
@@ -43,12 +50,25 @@ pub(crate) struct Upright {
     pub max_angle_rad: f64,
 }
 
-/// The plane with the largest connected patch of inliers, and those inliers as a mask over every `STRIDE`-th pixel.
-pub(crate) fn find(scan: &Scan, excluded: &[bool], upright: Upright, config: &GrounderConfig) -> Option<Plane> {
+/// The plane with the largest connected patch of inliers. `known` is where it was before: if it still holds most of what is
+/// measured, no other one can hold more, and none is looked for.
+pub(crate) fn find(
+    scan: &Scan,
+    excluded: &[bool],
+    upright: Upright,
+    known: Option<Plane>,
+    config: &GrounderConfig,
+) -> Option<Plane> {
     let coarse = Coarse::sample(scan, excluded, config);
     let measured = coarse.points.len();
     if measured < 200 {
         return None;
+    }
+    if let Some(known) = known.filter(|plane| plane.normal.dot(upright.up) > upright.max_angle_rad.cos()) {
+        let refined = refine(&coarse, known, upright);
+        if 2 * coarse.largest_patch(&refined).len() > measured {
+            return Some(finish(&coarse, refined, upright));
+        }
     }
     let mut candidates = draw(&coarse, upright, config);
     candidates.sort_by_key(|(score, _)| std::cmp::Reverse(*score));
@@ -249,9 +269,24 @@ mod tests {
             let config = GrounderConfig::default();
             let scan = Scan::read(&frame(normal, -height, 0.004), &config).ok().unwrap();
             let upright = Upright { up: DVec3::new(0.0, -pitch.cos(), -pitch.sin()), max_angle_rad: 0.15 };
-            let plane = find(&scan, &vec![false; scan.grid.len()], upright, &config).unwrap();
+            let plane = find(&scan, &vec![false; scan.grid.len()], upright, None, &config).unwrap();
             prop_assert!(plane.normal.angle_between(normal) < 0.006, "{:?}", plane);
             prop_assert!((plane.offset + height).abs() < 0.003, "{:?}", plane);
+        }
+    }
+
+    #[test]
+    fn where_a_known_plane_still_holds_most_it_is_refined_and_where_it_does_not_another_is_found() {
+        let config = GrounderConfig::default();
+        let normal = DVec3::new(0.0, -(0.9f64.cos()), -(0.9f64.sin()));
+        let scan = Scan::read(&frame(normal, -0.8, 0.004), &config).ok().unwrap();
+        let upright = Upright { up: normal, max_angle_rad: 0.15 };
+        let find = |known| find(&scan, &vec![false; scan.grid.len()], upright, known, &config).unwrap();
+        let drawn = find(None);
+        for offset in [-0.805, -0.7] {
+            let known = find(Some(Plane { normal, offset, residual_m: 0.0, noise_ratio: 1.0 }));
+            let off = known.normal.angle_between(drawn.normal);
+            assert!(off < 1e-3 && (known.offset - drawn.offset).abs() < 5e-4, "{known:?} {drawn:?}");
         }
     }
 
@@ -260,6 +295,6 @@ mod tests {
         let config = GrounderConfig::default();
         let scan = Scan::read(&frame(DVec3::NEG_Z, -0.9, 0.002), &config).ok().unwrap();
         let upright = Upright { up: DVec3::NEG_Y, max_angle_rad: 0.2 };
-        assert_eq!(find(&scan, &vec![false; scan.grid.len()], upright, &config), None);
+        assert_eq!(find(&scan, &vec![false; scan.grid.len()], upright, None, &config), None);
     }
 }

@@ -123,6 +123,30 @@ impl PixelSupport {
         runs.push(length);
         (count > 0).then_some(PixelSupport { count, bounds, runs })
     }
+    /// Packs ascending indices of pixels of an image with `pixels` of them; `None` without any.
+    ///
+    /// ```
+    /// # use acm_concept::object::PixelSupport;
+    /// let mask = [true, true, false, false, true, false];
+    /// assert_eq!(PixelSupport::from_indices(&[0, 1, 4], 3, 6), PixelSupport::from_mask(&mask, 3));
+    /// ```
+    pub fn from_indices(indices: &[usize], width: usize, pixels: usize) -> Option<PixelSupport> {
+        let (mut runs, mut at) = (Vec::new(), 0usize);
+        let mut bounds = [u32::MAX, u32::MAX, 0, 0];
+        for stretch in indices.chunk_by(|a, b| a + 1 == *b) {
+            let (first, end) = (stretch.first()?, stretch.last()? + 1);
+            runs.extend([(first - at) as u32, stretch.len() as u32]);
+            at = end;
+        }
+        for index in indices {
+            let (column, row) = ((index % width) as u32, (index / width) as u32);
+            bounds = [bounds[0].min(column), bounds[1].min(row), bounds[2].max(column), bounds[3].max(row)];
+        }
+        if at < pixels {
+            runs.push((pixels - at) as u32);
+        }
+        (!indices.is_empty()).then_some(PixelSupport { count: indices.len() as u32, bounds, runs })
+    }
     /// The pixel indices, ascending.
     pub fn indices(&self) -> Vec<usize> {
         let (mut at, mut set, mut indices) = (0usize, false, Vec::with_capacity(self.count as usize));

@@ -65,7 +65,8 @@ pub(crate) fn split(scene: &Scene, remembered: &Remembered, segments: &mut Segme
                 continue;
             }
             let point = to_world.transform_point(scene.point[pixel].as_dvec3());
-            let nearest = ghosts.iter().map(|ghost| ghost.distance_m(point)).enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
+            let nearest =
+                ghosts.iter().map(|ghost| ghost.distance_m(point)).enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
             if let Some((i, _)) = nearest.filter(|(_, d)| *d < 0.02) {
                 segments.labels[pixel] = first + i as u32;
             }

@@ -223,7 +223,6 @@ fn slice(edge: [DVec2; 2]) -> Vec<DVec3> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::distance_outside;
     use acm_concept::camera::Intrinsics;
     use glam::DQuat;
     use proptest::prelude::*;
@@ -252,7 +251,7 @@ mod tests {
             let placed = PlacedSolid { solid, pose };
             let outlines = image_outlines(&placed, &Pose::IDENTITY, &evidence);
             let pixel = DVec2::new(column, row);
-            let outside = outlines.iter().map(|o| distance_outside(o, pixel)).fold(f64::INFINITY, f64::min);
+            let outside = outlines.iter().map(|o| Outline::of(o).distance_outside(pixel)).fold(f64::INFINITY, f64::min);
             let meets = placed.intersect_ray(DVec3::ZERO, intrinsics.ray(column, row)).is_some();
             // Polygons with 24 corners stand for circles.
             prop_assert!(if meets { outside < 1.2 } else { outside > -1.2 }, "{solid:?}: {meets}, {outside} px outside");

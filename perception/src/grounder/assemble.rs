@@ -3,7 +3,7 @@
 use crate::{
     config::GrounderConfig,
     fit::{Evidence, Profile, profile},
-    hypotheses::{self, Context, Hypothesis},
+    hypotheses::{self, Context, Hypothesis, Misfit},
     scene::Scene,
 };
 use acm_concept::{
@@ -32,12 +32,8 @@ pub(super) fn object(
         h.model.template.nouns(&h.model.template.named(&values)).iter().any(|noun| noun == category)
     };
     let best = ranked.iter().find(offers).or(ranked.first())?;
-    let mut mask = vec![false; scene.grid.len()];
-    for &pixel in pixels {
-        mask[pixel] = true;
-    }
-    let support = PixelSupport::from_mask(&mask, scene.grid.width)?;
-    let appearance = scene.scan.appearance(&inner(scene, &mask, pixels));
+    let support = PixelSupport::from_indices(pixels, scene.grid.width, scene.grid.len())?;
+    let appearance = scene.scan.appearance(&inner(scene, pixels));
     let (on_surface, on_outline) = best.explained(evidence);
     // What is cut off all round may be anything.
     let whole = 1.0 - 0.6 * evidence.cut_share();
@@ -58,7 +54,9 @@ pub(super) fn object(
 }
 
 /// The pixels away from the segment's border, where colours mix; all of them if few are left.
-fn inner(scene: &Scene, mask: &[bool], pixels: &[usize]) -> Vec<usize> {
+fn inner(scene: &Scene, pixels: &[usize]) -> Vec<usize> {
+    let mut mask = vec![false; scene.grid.len()];
+    pixels.iter().for_each(|&pixel| mask[pixel] = true);
     let deep = |&&pixel: &&usize| scene.grid.neighbours(pixel).all(|n| mask[n]);
     let inner: Vec<usize> = pixels.iter().filter(deep).copied().collect();
     if inner.len() * 3 > pixels.len() { inner } else { pixels.to_vec() }
@@ -75,8 +73,8 @@ fn parts(
     let (model, minimum) = (&hypothesis.model, &hypothesis.minimum);
     let template = model.template;
     let placement = model.placement(&minimum.state);
-    let misfit_px = hypothesis.outline_misfit_px(evidence);
-    let calibration = Calibration::new(scene, &scene.world.transform_point(placement.pose.translation), misfit_px);
+    let misfit = hypothesis.misfit(evidence);
+    let calibration = Calibration::new(scene, &scene.world.transform_point(placement.pose.translation), misfit);
     let deviation = |index: usize| deviation(hypothesis, index);
     let (parameters, drift_m) = match hypothesis.tracked {
         // Nothing of its size was measured anew.
@@ -192,31 +190,40 @@ fn world_pose(scene: &Scene, hypothesis: &Hypothesis, remembered: Option<&Ground
 
 /// Turns the standard deviations of a fit into honest ones. Places err with the camera's calibration:
 /// sigma^2 = (k sigma_fit)^2 + floor^2 + (share z)^2. Sizes do not, but things are not quite of their template's shape:
-/// sigma^2 = sigma_fit^2 + floor^2 + (share misfit)^2 + (share height)^2, where the misfit is that of the outline.
+/// sigma^2 = sigma_fit^2 + floor^2 + shape^2, where the shape is told by how far outline and surface are from the fitted
+/// ones and by how much the walls lean; of a height by the outline, and by a share of itself.
 struct Calibration<'a> {
     config: &'a GrounderConfig,
     systematic_m: f64,
-    misfit_m: f64,
+    /// One pixel of the image at the thing, metres.
+    pixel_m: f64,
+    misfit: Misfit,
 }
 
 impl Calibration<'_> {
-    fn new<'a>(scene: &Scene<'a>, position: &DVec3, misfit_px: f64) -> Calibration<'a> {
+    fn new<'a>(scene: &Scene<'a>, position: &DVec3, misfit: Misfit) -> Calibration<'a> {
         let camera = (scene.world * scene.camera).inverse();
         let distance = camera.transform_point(*position).z.max(0.0);
         Calibration {
             config: scene.config,
             systematic_m: scene.config.sigma_floor_m.hypot(scene.config.sigma_range * distance),
-            misfit_m: misfit_px * distance / scene.scan.intrinsics.fx,
+            pixel_m: distance / scene.scan.intrinsics.fx,
+            misfit,
         }
     }
     /// `growth` is how much the extent across and the height grow with the parameter.
     fn size(&self, fitted: f64, value: f64, growth: DVec2) -> f64 {
+        let (config, misfit) = (self.config, &self.misfit);
         let shape = if growth.y > growth.x {
-            (self.config.size_sigma_top * self.misfit_m / growth.y).hypot(self.config.size_sigma_share * value)
+            let outline_m = misfit.outline_px * self.pixel_m;
+            (config.size_sigma_top * outline_m / growth.y).hypot(config.size_sigma_share * value)
         } else {
-            self.config.size_sigma_walls * self.misfit_m / growth.x
+            let outline_m = (misfit.outline_px - config.size_outline_px).max(0.0) * self.pixel_m;
+            let surface_m = config.size_sigma_surface_m * (misfit.surface - config.size_surface).max(0.0);
+            let lean_m = config.size_sigma_lean * misfit.lean_m;
+            (config.size_sigma_walls * outline_m).hypot(surface_m).hypot(lean_m) / growth.x
         };
-        fitted.hypot(shape).hypot(self.config.size_sigma_floor_m)
+        fitted.hypot(shape).hypot(config.size_sigma_floor_m)
     }
     fn length(&self, fitted: f64) -> f64 {
         (self.config.sigma_factor * fitted).hypot(self.systematic_m)

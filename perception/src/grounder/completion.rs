@@ -61,9 +61,10 @@ pub(super) fn complete(scene: &Scene, camera_pose: &Pose, library: &TemplateLibr
         added.push(more);
     }
     objects.par_iter_mut().zip(added).filter(|(_, more)| !more.is_empty()).for_each(|(object, more)| {
-        let mut mask = vec![false; scene.grid.len()];
-        object.support.indices().into_iter().chain(more).for_each(|pixel| mask[pixel] = true);
-        if let Some(support) = PixelSupport::from_mask(&mask, scene.grid.width) {
+        let mut all = object.support.indices();
+        all.extend(more);
+        all.sort_unstable();
+        if let Some(support) = PixelSupport::from_indices(&all, scene.grid.width, scene.grid.len()) {
             object.support = support;
         }
     });

@@ -87,7 +87,10 @@ pub(super) fn find<'a>(scene: &Scene, context: Context<'a>, remembered: &'a Reme
 /// Whether most of what is visible of a thing is where memory expects it.
 fn is_in_place(ghost: &Ghost) -> bool {
     let (agrees, differs) = ghost.agreement();
-    !ghost.flat && !ghost.held && ghost.views > 0 && agrees as f64 > IN_PLACE * (agrees + differs) as f64
+    !ghost.flat
+        && !ghost.held
+        && ghost.views > 0
+        && agrees as f64 > IN_PLACE * (agrees + differs) as f64
         && agrees >= CLAIM_PX
 }
 
@@ -159,8 +162,7 @@ fn claims(scene: &Scene, ghosts: &[&Ghost]) -> (Segments, Vec<Option<usize>>) {
 /// Whether something holds of a pixel and of the square round it.
 fn is_thick(scene: &Scene, pixel: usize, holds: impl Fn(usize) -> bool) -> bool {
     let reach = EDGE_PX as isize;
-    (-reach..=reach)
-        .all(|dy| (-reach..=reach).all(|dx| scene.grid.offset(pixel, dx, dy).is_some_and(&holds)))
+    (-reach..=reach).all(|dy| (-reach..=reach).all(|dx| scene.grid.offset(pixel, dx, dy).is_some_and(&holds)))
 }
 
 /// Whether some pixels have a thing's colours: all of them together, and each patch of them.
@@ -172,6 +174,7 @@ fn has_its_colors(scene: &Scene, ghost: &Ghost, pixels: &[usize]) -> bool {
     let limit = ODD_TINT + ODD_SPREADS * ghost.appearance.spread as f32;
     let odd = |pixel: usize| scene.scan.tint(pixel).distance(&remembered) > limit;
     let is_own = |pixel: usize| pixels.binary_search(&pixel).is_ok();
-    let patches = pixels.iter().filter(|&&pixel| odd(pixel) && is_thick(scene, pixel, |near| odd(near) && is_own(near)));
+    let patches =
+        pixels.iter().filter(|&&pixel| odd(pixel) && is_thick(scene, pixel, |near| odd(near) && is_own(near)));
     patches.count() <= FEW_PX
 }

@@ -139,7 +139,5 @@ impl Grounder {
 }
 
 fn support_of(scene: &Scene, pixels: &[usize]) -> Option<PixelSupport> {
-    let mut set = vec![false; scene.grid.len()];
-    pixels.iter().for_each(|&pixel| set[pixel] = true);
-    PixelSupport::from_mask(&set, scene.grid.width)
+    PixelSupport::from_indices(pixels, scene.grid.width, scene.grid.len())
 }

@@ -356,6 +356,49 @@ fn expected_objects_are_seen_missed_hidden_or_out_of_view() {
 }
 
 #[test]
+fn what_memory_explains_is_verified_and_what_took_its_place_is_noticed() {
+    const SIZE: DVec3 = DVec3::new(0.06, 0.05, 0.05);
+    const SAND: [f64; 3] = [0.8, 0.6, 0.2];
+    let table = |fill: &dyn Fn(&mut World)| {
+        let mut world = World::table();
+        fill(&mut world);
+        world.block(DVec3::new(0.04, 0.04, 0.06), 0.15, -0.1, 0.3, [0.2, 0.6, 0.3]);
+        world
+    };
+    let block = |size: DVec3, x: f64, color| table(&move |world: &mut World| world.block(size, x, -0.1, 0.0, color));
+    for seed in [71, 73] {
+        let known = remembered(&ground("known", &block(SIZE, 0.0, SAND), head_camera(), seed, &instruction()));
+        assert_eq!(known.objects.len(), 2);
+        let look = |name: &str, world: World| ground(name, &world, head_camera(), seed + 1, &known);
+        let length = |o: &GroundedObject| o.parts[0].parameters[0].value;
+        let at = |percepts: &Percepts, x: f64| {
+            let near = |o: &&GroundedObject| place(o).distance(DVec2::new(x, -0.1)) < 0.015;
+            percepts.objects.iter().find(near).unwrap_or_else(|| panic!("{}", summary(percepts))).clone()
+        };
+        let same = look("same", block(SIZE, 0.0, SAND));
+        assert_eq!(same.objects.len(), 2);
+        assert!(same.objects.iter().all(|o| o.expected.is_some()), "{}", summary(&same));
+        assert!((length(&at(&same, 0.0)) - 0.06).abs() < 0.002);
+        let longer = look("longer", block(SIZE + DVec3::X * 0.008, 0.0, SAND));
+        assert!((length(&at(&longer, 0.0)) - 0.068).abs() < 0.003, "{}", summary(&longer));
+        let moved = look("moved", block(SIZE, 0.012, SAND));
+        assert!((place(&at(&moved, 0.012)).x - place(&at(&same, 0.0)).x - 0.012).abs() < 0.003, "{}", summary(&moved));
+        let round = look("round", table(&|world| world.disc(0.029, 0.05, 0.0, -0.1, SAND)));
+        assert_eq!(at(&round, 0.0).parts[0].template, "cylinder", "{}", summary(&round));
+        let topped = look("topped", table(&|world| {
+            world.block(SIZE, 0.0, -0.1, 0.0, SAND);
+            world.cube(0.0, -0.1, SIZE.z, 0.0);
+        }));
+        assert_eq!(topped.objects.len(), 3, "{}", summary(&topped));
+        let halved = look("halved", table(&|world| {
+            world.block(SIZE.with_x(0.03), -0.015, -0.1, 0.0, SAND);
+            world.block(SIZE.with_x(0.03), 0.015, -0.1, 0.0, [0.1, 0.3, 0.8]);
+        }));
+        assert_eq!(halved.objects.len(), 3, "{}", summary(&halved));
+    }
+}
+
+#[test]
 fn memory_tells_two_touching_blocks_apart() {
     let size = DVec3::new(0.05, 0.05, 0.05);
     let mut apart = World::table();

@@ -56,6 +56,9 @@ impl World {
     pub fn block(&mut self, size: DVec3, x: f64, y: f64, yaw: f64, color: [f64; 3]) {
         self.things.push(cuboid(size, DVec3::new(x, y, TABLE_TOP_M), yaw, color));
     }
+    pub fn disc(&mut self, radius: f64, height: f64, x: f64, y: f64, color: [f64; 3]) {
+        self.things.push(disc(radius, height, DVec3::new(x, y, TABLE_TOP_M), color));
+    }
     pub fn button(&mut self, x: f64, y: f64) {
         self.things.push(disc(BUTTON_RADIUS_M, 0.02, DVec3::new(x, y, TABLE_TOP_M), GREY));
         self.things.push(disc(0.035, 0.008, DVec3::new(x, y, TABLE_TOP_M + 0.02), RED));

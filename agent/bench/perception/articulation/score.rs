@@ -68,8 +68,7 @@ fn within(deg: f64, metres: f64) -> bool {
 pub fn score(trial: &Trial, answer: &Result<Vec<MovedPart>, NotTold>) -> Scored {
     let truth = &trial.truth;
     let (origin, axis) = truth.seen;
-    let mut scored =
-        Scored { shows: trial.shows, bias: distance(truth, axis, Some(origin)), ..Scored::default() };
+    let mut scored = Scored { shows: trial.shows, bias: distance(truth, axis, Some(origin)), ..Scored::default() };
     let Some((part, further)) = answer.as_ref().ok().and_then(|parts| parts.split_first()) else { return scored };
     let [before, after] = &trial.part;
     let shows = |pixels: &[bool]| pixels.iter().filter(|shown| **shown).count();
@@ -164,7 +163,10 @@ impl Tally {
             ("joint_right", self.share(|scored| scored.kind_right)),
             ("axis_of_a_perfect_reading", self.share_of_showing(|scored| within(scored.bias.0, scored.bias.1))),
             ("further_parts", self.scored.iter().map(|scored| scored.further as f64).sum()),
-            ("axis_within_2_sigma", self.share_of_showing(|scored| scored.axis() && scored.sigmas.iter().all(|off| *off <= 2.0))),
+            (
+                "axis_within_2_sigma",
+                self.share_of_showing(|scored| scored.axis() && scored.sigmas.iter().all(|off| *off <= 2.0)),
+            ),
         ];
         Row::new(name, self.figures().into_iter().chain(more))
     }
