@@ -1,7 +1,8 @@
 //! RGB-D frames, nominal calibration and the memory's expectation in; grounded analytic concepts with uncertainty out.
 //!
-//! Geometry first, without learned weights: the support plane is found, what rises above it is cut into segments,
-//! flat patches are found by colour, and the templates of the library are fitted to each by robust least squares.
+//! Geometry first, without learned weights: the support plane is found; of what rises above it known things are fitted where
+//! memory expects them, and what they do not explain is cut into segments; flat patches are found by colour; the templates of
+//! the library are fitted to each by robust least squares.
 //! [`Grounder::ground`] never fails: a frame that cannot be read is an ordinary answer with a [`Blindness`] and no
 //! objects.
 //!

@@ -102,6 +102,22 @@ impl<'a, 'b> Evidence<'a, 'b> {
         costs.sum::<f64>() / self.weight().max(1e-9) + self.unlikely(screw)
     }
 
+    /// Share of the points' weight whose surface the other frame sees from behind: how thick the part is decides where they
+    /// are there, and only its rim tells that.
+    pub fn turned_away(&self, screw: &Screw) -> f64 {
+        let motion = screw.pose();
+        let ways = [(motion, 0, 1), (motion.inverse(), 1, 0)];
+        let away = ways.iter().flat_map(|(motion, from, to)| {
+            let behind = move |point: &&Point| {
+                let at = motion.transform_point(point.at);
+                let sight = (self.views[*to].camera.translation - at).normalize();
+                motion.transform_vector(point.normal).dot(sight) < BEHIND
+            };
+            self.points[*from].iter().filter(behind).map(|point| point.weight)
+        });
+        away.sum::<f64>() / self.weight().max(1e-9)
+    }
+
     /// What a turn costs by itself: a part hangs on a hinge near to it.
     fn unlikely(&self, screw: &Screw) -> f64 {
         if screw.kind == Kind::Prismatic {

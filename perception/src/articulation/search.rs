@@ -30,6 +30,9 @@ const DOUBT: f64 = 0.1;
 const SPREAD_STEP: f64 = 0.25;
 const LEAST_CURVATURE: f64 = 100.0;
 
+/// Error of a hinge's place where one frame shows a part's outer side and the other one its inner side, metres.
+const SIDES_M: f64 = 0.06;
+
 /// What was found.
 #[derive(Debug, Clone)]
 pub(super) struct Found {
@@ -118,7 +121,10 @@ fn spread(evidence: &Evidence, screw: &Screw, independent: f64, distance: f64, c
     };
     let place = if count > 3 { (variance(3) + variance(4)).sqrt() } else { 0.0 };
     let direction = (variance(1) + variance(2)).sqrt();
-    let systematic = config.sigma_floor_m.hypot(config.sigma_range * distance);
+    // A point near the axis moves by twice the sine of half the turn of its distance: small turns tell places badly.
+    let lever = (1.0 / (2.0 * (0.5 * screw.amount).sin().abs()).max(0.1)).max(1.0);
+    let systematic = lever * config.sigma_floor_m.hypot(config.sigma_range * distance);
+    let systematic = systematic.hypot(SIDES_M * evidence.turned_away(screw));
     [
         config.sigma_factor * direction,
         (config.sigma_factor * place).hypot(systematic),

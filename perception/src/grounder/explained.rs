@@ -47,15 +47,15 @@ pub(super) fn find<'a>(scene: &Scene, context: Context<'a>, remembered: &'a Reme
     if ghosts.is_empty() {
         return Vec::new();
     }
-    let (segments, owners) = claims(scene, &ghosts);
+    let (segments, explains) = claims(scene, &ghosts);
     let claimed: Vec<(usize, Vec<usize>)> =
-        segments.pixels().into_iter().enumerate().filter(|(label, _)| owners[*label].is_some()).collect();
+        segments.pixels().into_iter().take(ghosts.len()).enumerate().filter(|(at, _)| explains[*at]).collect();
     let mut pieces: Vec<(f64, usize, Vec<usize>, Evidence)> = claimed
         .into_par_iter()
-        .filter(|(label, pixels)| owners[*label].is_some_and(|at| has_its_colors(scene, ghosts[at], pixels)))
-        .filter_map(|(label, pixels)| {
+        .filter(|(at, pixels)| has_its_colors(scene, ghosts[*at], pixels))
+        .map(|(at, pixels)| {
             let evidence = Evidence::of_segment(scene, &segments, &pixels);
-            Some((scene.lowest_m(&pixels), owners[label]?, pixels, evidence))
+            (scene.lowest_m(&pixels), at, pixels, evidence)
         })
         .collect();
     // From below, so that what stands on another thing finds it.
@@ -94,9 +94,9 @@ fn is_in_place(ghost: &Ghost) -> bool {
         && agrees >= CLAIM_PX
 }
 
-/// The blobs of what stands on the plane, cut where two known things touch, and which of the known things explains each;
-/// `None` where more stands there than is known.
-fn claims(scene: &Scene, ghosts: &[&Ghost]) -> (Segments, Vec<Option<usize>>) {
+/// The blobs of what stands on the plane, cut where two known things touch, and whether each of the known things explains
+/// all that stands in its place. Known things have the first labels; what they do not explain has others, as their neighbour.
+fn claims(scene: &Scene, ghosts: &[&Ghost]) -> (Segments, Vec<bool>) {
     let near = |a: usize, b: usize| (scene.scan.smooth[a] - scene.scan.smooth[b]).abs() < STEP_M;
     let (blobs, sizes) = scene.grid.components(&scene.rising, near);
     let mut claiming: Vec<Vec<usize>> = vec![Vec::new(); sizes.len()];
@@ -130,33 +130,29 @@ fn claims(scene: &Scene, ghosts: &[&Ghost]) -> (Segments, Vec<Option<usize>>) {
             strange[blob as usize] += 1;
         }
     }
-    // A thing of which any blob shows more than it is explained by none of them.
-    let mut settled: Vec<bool> = (0..ghosts.len())
-        .map(|at| (0..sizes.len()).all(|blob| strange[blob] <= FEW_PX || !claiming[blob].contains(&at)))
-        .collect();
+    // What shares a blob with something strange may be larger than it was, and what shares one with that may be too.
+    let mut explains = vec![true; ghosts.len()];
     loop {
-        let touches = |blob: &Vec<usize>| blob.iter().any(|&at| !settled[at]);
-        let drop: Vec<usize> = claiming.iter().filter(|blob| touches(blob)).flatten().copied().collect();
-        let drop: Vec<usize> = drop.into_iter().filter(|&at| settled[at]).collect();
-        if drop.is_empty() {
+        let doubtful = |blob: &usize| strange[*blob] > FEW_PX || claiming[*blob].iter().any(|&at| !explains[at]);
+        let dropped: Vec<usize> = (0..sizes.len()).filter(doubtful).flat_map(|blob| claiming[blob].clone()).collect();
+        if dropped.iter().all(|&at| !explains[at]) {
             break;
         }
-        drop.into_iter().for_each(|at| settled[at] = false);
+        dropped.into_iter().for_each(|at| explains[at] = false);
     }
-    // One label a known thing; after them the blobs that none explains, as neighbours of those.
     let label = |pixel: usize| match blobs[pixel] {
         NONE => NONE,
         blob => match claiming[blob as usize].as_slice() {
-            [only] if settled[*only] => *only as u32,
-            [first, ..] if settled[*first] => owner[pixel].map_or(NONE, |at| at as u32),
+            [first, rest @ ..] if explains[*first] => {
+                let own = if rest.is_empty() { Some(*first) } else { owner[pixel] };
+                own.map_or(NONE, |at| at as u32)
+            }
             _ => ghosts.len() as u32 + blob,
         },
     };
     let labels = scene.grid.map(label);
-    let owners: Vec<Option<usize>> =
-        (0..ghosts.len() + sizes.len()).map(|at| (at < ghosts.len() && settled[at]).then_some(at)).collect();
     let inner = vec![false; labels.len()];
-    (Segments { count: owners.len(), labels, inner }, owners)
+    (Segments { count: ghosts.len() + sizes.len(), labels, inner }, explains)
 }
 
 /// Whether something holds of a pixel and of the square round it.
