@@ -385,10 +385,13 @@ fn what_memory_explains_is_verified_and_what_took_its_place_is_noticed() {
         assert!((place(&at(&moved, 0.012)).x - place(&at(&same, 0.0)).x - 0.012).abs() < 0.003, "{}", summary(&moved));
         let round = look("round", table(&|world| world.disc(0.029, 0.05, 0.0, -0.1, SAND)));
         assert_eq!(at(&round, 0.0).parts[0].template, "cylinder", "{}", summary(&round));
-        let topped = look("topped", table(&|world| {
-            world.block(SIZE, 0.0, -0.1, 0.0, SAND);
-            world.cube(0.0, -0.1, SIZE.z, 0.0);
-        }));
+        let topped = look(
+            "topped",
+            table(&|world| {
+                world.block(SIZE, 0.0, -0.1, 0.0, SAND);
+                world.cube(0.0, -0.1, SIZE.z, 0.0);
+            }),
+        );
         assert_eq!(topped.objects.len(), 3, "{}", summary(&topped));
         let other = look("other", block(SIZE, 0.0, [0.1, 0.3, 0.8]));
         let colors = [at(&other, 0.0), at(&same, 0.0)].map(|object| object.appearance.mean);
