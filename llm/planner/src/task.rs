@@ -53,6 +53,54 @@ pub struct Subtask {
     pub span: Span,
     /// What shall be so.
     pub goal: Goal,
+    /// What must hold when the subtask is due: where it does not, nothing is done ("if the drawer is open, close it").
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub when: Option<Condition>,
+}
+
+/// A statement about things that is so or is not: `predicate(arguments)`.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Condition {
+    /// A predicate of [literals](https://docs.rs/acm-concept): `open`, `on`, `visible`.
+    pub predicate: String,
+    /// What it is said of.
+    pub arguments: Vec<ReferenceIndex>,
+    /// Whether it must not hold.
+    pub negated: bool,
+}
+
+/// How often something is done.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Times {
+    /// A number that the instruction names.
+    Count(u32),
+    /// The number that a thing shows ("as often as the card says").
+    Shown(ReferenceIndex),
+}
+
+/// In which order the members of a group are taken.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Ordering {
+    /// Any.
+    Any,
+    /// Beginning at a side ("from left to right").
+    From(Direction),
+    /// One after the other as named: each is a description of one member ("red, green and blue in that order").
+    Named(Vec<ReferenceIndex>),
+}
+
+/// What is varied from try to try, where the instruction does not say which one is right.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Variation {
+    /// Which member of the group stands where: the places are those on which they stand at the start.
+    Order,
+    /// Which way round each member lies, by half a turn about the vertical.
+    Heading,
+    /// Which member it is.
+    Choice,
 }
 
 /// What a subtask brings about.
@@ -80,20 +128,67 @@ pub enum Goal {
         /// What it is performed on.
         object: ReferenceIndex,
         /// How often.
-        times: u32,
+        times: Times,
+    },
+    /// A predicate holds of the object, or does not: `open`, `switched-on`, `sliced`.
+    State {
+        /// The predicate.
+        predicate: String,
+        /// What it is said of.
+        object: ReferenceIndex,
+        /// Whether it shall be so.
+        holds: bool,
+    },
+    /// The goals of the body, one after the other, for each member of a group, one member at a time. In the body the
+    /// group's index means the member whose turn it is.
+    Each {
+        /// The group.
+        members: ReferenceIndex,
+        /// Who comes first.
+        order: Ordering,
+        /// What is done with each.
+        body: Vec<Goal>,
+    },
+    /// Something about a group is varied until a sign shows, or, where no sign can be seen, until all has been tried.
+    Find {
+        /// What is varied.
+        members: ReferenceIndex,
+        /// How.
+        vary: Variation,
+        /// Where the members must be for a try to count ("in the holder"), if anywhere.
+        within: Option<Destination>,
+        /// What is done to try what stands there ("press after each new arrangement"), if anything.
+        probe: Option<Box<Goal>>,
+        /// What shows that it is right, if anything does.
+        sign: Option<Condition>,
+    },
+    /// Nothing is done before the condition holds.
+    Await {
+        /// The condition.
+        condition: Condition,
     },
 }
 
 impl Goal {
-    /// The object that the goal is about.
-    pub fn object(&self) -> ReferenceIndex {
+    /// The object that the goal is about; `None` where it is about nothing that is acted on.
+    pub fn object(&self) -> Option<ReferenceIndex> {
         match self {
-            Goal::At { object, .. } | Goal::Holding { object, .. } | Goal::Performed { object, .. } => *object,
+            Goal::At { object, .. }
+            | Goal::Holding { object, .. }
+            | Goal::Performed { object, .. }
+            | Goal::State { object, .. } => Some(*object),
+            Goal::Each { members, .. } | Goal::Find { members, .. } => Some(*members),
+            Goal::Await { .. } => None,
         }
     }
     /// Whether reaching the goal may move its object.
     pub fn moves(&self) -> bool {
-        matches!(self, Goal::At { .. } | Goal::Holding { .. })
+        match self {
+            Goal::At { .. } | Goal::Holding { .. } => true,
+            Goal::Each { body, .. } => body.iter().any(Goal::moves),
+            Goal::Find { vary, .. } => matches!(vary, Variation::Order | Variation::Heading),
+            Goal::Performed { .. } | Goal::State { .. } | Goal::Await { .. } => false,
+        }
     }
 }
 
@@ -103,6 +198,16 @@ impl Goal {
 pub enum Destination {
     /// On top of a thing, at its centre.
     On {
+        /// The thing.
+        reference: ReferenceIndex,
+    },
+    /// Inside a thing that contains: a box, a drawer, a basket.
+    In {
+        /// The thing.
+        reference: ReferenceIndex,
+    },
+    /// Below a thing, covered by it or under its top.
+    Under {
         /// The thing.
         reference: ReferenceIndex,
     },
@@ -153,16 +258,22 @@ pub enum Direction {
     Front,
     /// Far, towards positive y.
     Back,
+    /// High: towards positive z.
+    Up,
+    /// Low: towards negative z.
+    Down,
 }
 
 impl Direction {
-    /// The unit vector in the world's x-y plane.
-    pub fn vector(self) -> glam::DVec2 {
+    /// The unit vector in the world.
+    pub fn vector(self) -> glam::DVec3 {
         match self {
-            Direction::Left => glam::DVec2::NEG_X,
-            Direction::Right => glam::DVec2::X,
-            Direction::Front => glam::DVec2::NEG_Y,
-            Direction::Back => glam::DVec2::Y,
+            Direction::Left => glam::DVec3::NEG_X,
+            Direction::Right => glam::DVec3::X,
+            Direction::Front => glam::DVec3::NEG_Y,
+            Direction::Back => glam::DVec3::Y,
+            Direction::Up => glam::DVec3::Z,
+            Direction::Down => glam::DVec3::NEG_Z,
         }
     }
 }
@@ -177,6 +288,8 @@ pub enum Quantity {
     AnyOne,
     /// All that fit, as a group.
     Group,
+    /// So many of those that fit, whichever.
+    Count(u32),
 }
 
 /// A choice by size.
@@ -240,6 +353,27 @@ pub struct ObjectReference {
     pub located: Option<Box<Destination>>,
     /// Not these ("the other cube").
     pub other_than: Vec<ReferenceIndex>,
+    /// What it is a part of ("the top drawer of the cabinet"): it is described among the parts of this thing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub part_of: Option<ReferenceIndex>,
+    /// What it looks like in shape and colour ("its twin"), without being it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub twin_of: Option<ReferenceIndex>,
+    /// States that it must be in when it is due, and whether they must hold ("the open drawer", "a sliced apple").
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub states: Vec<(String, bool)>,
+    /// Which one by what was done with it in this episode ("the one you took first").
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub handled: Option<Handled>,
+}
+
+/// A choice by what the agent did, from its own transitions.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Handled {
+    /// The predicate that the deed brought about: `holding`, `at`, `open`, `pressed`.
+    pub effect: String,
+    /// Which one in time, counted from 0; from the last one if negative (-1).
+    pub rank: i32,
 }
 
 impl Task {

@@ -291,7 +291,7 @@ fn keep_rank(contenders: &mut Vec<&ObjectEntry>, rank: Rank, began: Option<Momen
     let spot =
         |entry: &ObjectEntry| place_at(entry, began).map_or(DVec2::ZERO, |(pose, _)| pose.translation.truncate());
     let key = |entry: &ObjectEntry, middle: DVec2| match rank {
-        Rank::FromSide(_, side) => -spot(entry).dot(Direction::vector(side)),
+        Rank::FromSide(_, side) => -spot(entry).dot(side.vector().truncate()),
         Rank::Middle => spot(entry).distance(middle),
     };
     let middle = contenders.iter().map(|entry| spot(entry)).sum::<DVec2>() / contenders.len().max(1) as f64;

@@ -167,7 +167,7 @@ impl Grounder<'_> {
         };
         let moved_entry = self.view.object(moved);
         let distance = radius(Some(entry)) + radius(moved_entry) + BESIDE_GAP_M;
-        let spot = |side: Direction| pose.translation.truncate() + side.vector() * distance;
+        let spot = |side: Direction| pose.translation.truncate() + side.vector().truncate() * distance;
         let others = |spot: DVec2| {
             let far = |entry: &&ObjectEntry| {
                 entry.id != moved

@@ -228,7 +228,7 @@ impl<'a> Grounding<'a> {
                 };
                 self.function(&format!("{place}/function"), None, &function);
                 let object = self.one(&object, form.thing, &Role::Function(function.clone()))?;
-                Goal::Performed { function, object, times }
+                Goal::Performed { function, object, times: Times::Count(times) }
             }
             GoalForm::At => {
                 let object = self.one(&object, form.thing, &Role::Effect("at"))?;

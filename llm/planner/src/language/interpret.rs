@@ -64,7 +64,7 @@ impl Interpretation<'_> {
     }
 
     fn subtask(&self, clause: &Clause, goal: Goal) -> Subtask {
-        Subtask { text: clause.span.of(self.text).into(), span: clause.span, goal }
+        Subtask { text: clause.span.of(self.text).into(), span: clause.span, goal, when: None }
     }
 
     /// Where the next subtask belongs. The two halves of an exchange are never parted.
@@ -130,7 +130,7 @@ impl Interpretation<'_> {
         Ok(match &clause.goal {
             FrameGoal::Holding(held) => Goal::Holding { object, held: *held },
             FrameGoal::Performed(function) => {
-                Goal::Performed { function: function.clone(), object, times: clause.times.unwrap_or(1) }
+                Goal::Performed { function: function.clone(), object, times: Times::Count(clause.times.unwrap_or(1)) }
             }
             FrameGoal::At | FrameGoal::Exchange | FrameGoal::Nothing => {
                 let destination = match (&clause.place, clause.history) {
