@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// Bytes `start..end` of the instruction.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Span {
     /// First byte.
     pub start: usize,
@@ -279,10 +279,11 @@ impl Direction {
 }
 
 /// How many things a phrase means.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Quantity {
     /// The one that fits: more than one is ambiguous.
+    #[default]
     TheOne,
     /// Any one that fits.
     AnyOne,
@@ -325,7 +326,7 @@ pub enum Rank {
 
 /// A description of a thing. Positions in it ("left", "on the mat") are meant as they were when the subtask
 /// `subtask` began, so that a description stays true of what was moved because of it.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct ObjectReference {
     /// The words.
     pub phrase: String,

@@ -4,6 +4,7 @@
 //! needs and is not so becomes a goal before it. Partial plans are tried in the order of their cost: expected
 //! failures and length. Nothing here knows a task: the skills, their conditions and effects come from memory.
 
+mod derived;
 mod state;
 
 use crate::explanation::{Rejected, step_words};
@@ -13,6 +14,8 @@ use acm_concept::{
 };
 use acm_memory::{MemoryView, query::SkillCandidate};
 use state::{State, same_atom};
+
+pub(crate) use derived::brings_about;
 use std::{
     cmp::Ordering,
     collections::{BTreeMap, BinaryHeap},
@@ -102,6 +105,11 @@ struct Node<'v> {
     agenda: Vec<Item>,
     steps: Vec<SkillCandidate>,
     assumed: Vec<Literal>,
+}
+
+/// What is believed of a literal: by memory, or concluded from what memory believes of where things stand.
+pub(crate) fn believed(view: &dyn MemoryView, literal: &Literal) -> Belief {
+    State::now(view).belief(literal)
 }
 
 /// Looks for the cheapest plan that reaches all wants.
@@ -199,7 +207,7 @@ impl<'v> Search<'v, '_> {
                     return None;
                 }
                 Item::Apply { candidate, purpose, repairs } => {
-                    let missing = self.conditions(&candidate).into_iter();
+                    let missing = self.conditions(&node, &candidate).into_iter();
                     let missing: Vec<Condition> = missing.filter(|c| self.truth(&node, c) != Truth::Yes).collect();
                     if missing.is_empty() {
                         self.apply(&mut node, *candidate);
@@ -238,10 +246,13 @@ impl<'v> Search<'v, '_> {
         }
     }
 
-    /// What must be so for a step; the place is made free while the hand still is.
-    fn conditions(&self, candidate: &SkillCandidate) -> Vec<Condition> {
-        let free = candidate.destination.map(|place| Condition::Free { place, object: candidate.part.object });
-        free.into_iter().chain(candidate.preconditions.iter().cloned().map(Condition::Literal)).collect()
+    /// What must be so for a step; the place is made free while the hand still is, and what the step acts on is laid bare
+    /// before that.
+    fn conditions(&self, node: &Node<'v>, candidate: &SkillCandidate) -> Vec<Condition> {
+        let object = candidate.part.object;
+        let bare = derived::hidden_by(&node.state, object).into_iter().map(Condition::Literal);
+        let free = candidate.destination.map(|place| Condition::Free { place, object });
+        bare.chain(free).chain(candidate.preconditions.iter().cloned().map(Condition::Literal)).collect()
     }
 
     fn apply(&self, node: &mut Node<'v>, candidate: SkillCandidate) {
@@ -267,7 +278,16 @@ impl<'v> Search<'v, '_> {
                 let carried = literal.subject().map(|under| node.state.carried_by(under)).unwrap_or_default();
                 self.move_away(node, carried);
             }
+            Condition::Literal(literal) if literal.predicate == "covered" && literal.negated => {
+                let covering = literal.subject().map(|object| node.state.covering(object)).unwrap_or_default();
+                self.move_away(node, covering);
+            }
             Condition::Literal(literal) => {
+                for ways in derived::ways(&node.state, literal) {
+                    let mut next = node.clone();
+                    next.agenda.extend(ways.into_iter().rev().map(|way| Item::Achieve(Condition::Literal(way))));
+                    self.push(next);
+                }
                 for candidate in self.achievers(node, literal) {
                     self.consider(node, candidate, Some(condition.clone()));
                 }
@@ -325,7 +345,7 @@ impl<'v> Search<'v, '_> {
             self.note_what_is_missing(&candidate);
         }
         let mut next = node.clone();
-        let conditions = self.conditions(&candidate);
+        let conditions = self.conditions(node, &candidate);
         next.agenda.push(Item::Apply { candidate: Box::new(candidate), purpose, repairs: 0 });
         next.agenda.extend(conditions.into_iter().rev().map(Item::Achieve));
         self.push(next);

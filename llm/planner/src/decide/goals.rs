@@ -1,0 +1,195 @@
+//! What a goal asks for next: whether it is reached, and if not, what shall hold.
+
+use super::{Grounded, MAX_LOOKS, Mind};
+use crate::{
+    decision::GiveUpCause,
+    ground::{Stuck, missing},
+    search::{Want, believed},
+    task::{Condition, Goal, Ordering, ReferenceIndex, Subtask, Times},
+};
+use acm_concept::literal::{Belief, Literal, Term, Truth};
+use acm_memory::entry::{Moment, Presence};
+
+/// The most that is done for one number that a thing shows.
+const MAX_SHOWN: f64 = 99.0;
+
+/// What a goal asks for next.
+pub(super) enum Next {
+    /// Nothing: it is reached, and why that is believed.
+    Reached(String),
+    /// Another look, and what for.
+    Look(String),
+    /// That something holds.
+    Pursue(Box<Grounded>),
+}
+
+impl Mind<'_> {
+    /// For a subtask with a condition: how it ends where the condition does not hold. Once something was done for the
+    /// subtask its condition is not asked again, which that may have changed.
+    pub(super) fn not_asked_for(&self, subtask: &Subtask) -> Result<Option<Next>, Stuck> {
+        let Some(when) = subtask.when.as_ref().filter(|_| self.tries().next().is_none()) else { return Ok(None) };
+        let (literal, belief) = self.condition(when)?;
+        self.weigh(&(literal.clone(), belief.clone()));
+        match belief.truth {
+            Truth::Yes => Ok(None),
+            Truth::No => Ok(Some(Next::Reached(format!("not asked for: not {literal}: {}", belief.reason)))),
+            Truth::Unknown => {
+                let text = format!("\"{}\" depends on whether {literal}: {}", subtask.text, belief.reason);
+                Err(Stuck::look(GiveUpCause::Memory, text))
+            }
+        }
+    }
+
+    /// A condition as a ground literal with what is believed of it.
+    pub(super) fn condition(&self, condition: &Condition) -> Result<(Literal, Belief), Stuck> {
+        let mut arguments = Vec::with_capacity(condition.arguments.len());
+        for index in &condition.arguments {
+            arguments.push(Term::Object(self.ground.object(*index)?.value));
+        }
+        let literal = Literal::new(&condition.predicate, arguments);
+        let literal = if condition.negated { literal.negate() } else { literal };
+        let belief = believed(self.view, &literal);
+        Ok((literal, belief))
+    }
+
+    /// What the goal of the current subtask asks for next.
+    pub(super) fn next(&self, goal: &Goal) -> Result<Next, Stuck> {
+        match goal {
+            Goal::Each { members, order, body } => self.each(*members, order, body),
+            Goal::Find { members, vary, within, probe, sign } => {
+                self.find(*members, *vary, within.as_ref(), probe.as_deref(), sign.as_ref())
+            }
+            Goal::Await { condition } => self.wait(condition),
+            Goal::At { .. } | Goal::Holding { .. } | Goal::Performed { .. } | Goal::State { .. } => {
+                self.reach(goal, self.since())
+            }
+        }
+    }
+
+    /// A goal about one thing, of which what was done after `since` counts.
+    pub(super) fn reach(&self, goal: &Goal, since: Moment) -> Result<Next, Stuck> {
+        let goal = self.ground_goal(goal, since)?;
+        goal.literals.iter().for_each(|literal| self.weigh(literal));
+        let with = |truth| goal.literals.iter().find(move |(_, belief)| belief.truth == truth);
+        let open = with(Truth::No).is_some();
+        match with(Truth::Unknown) {
+            Some((literal, belief)) if !open && self.situation.looks < MAX_LOOKS => {
+                Ok(Next::Look(format!("I cannot tell whether {literal}: {}", belief.reason)))
+            }
+            None if !open => {
+                let said = goal.literals.iter().map(|(literal, belief)| format!("{literal}: {}", belief.reason));
+                Ok(Next::Reached(said.collect::<Vec<_>>().join("; ")))
+            }
+            _ => Ok(Next::Pursue(Box::new(goal))),
+        }
+    }
+
+    fn ground_goal(&self, goal: &Goal, since: Moment) -> Result<Grounded, Stuck> {
+        let index = goal.object().filter(|_| !matches!(goal, Goal::Each { .. } | Goal::Find { .. }));
+        let index = index.ok_or_else(|| {
+            Stuck::give_up(
+                GiveUpCause::Plan,
+                format!("\"{}\" lies within another one of its kind", self.task.describe(goal)),
+            )
+        })?;
+        let meant = self.ground.object(index)?;
+        let object = meant.value;
+        if self.view.object(object).is_none_or(|entry| entry.presence == Presence::Missing) {
+            return Err(missing(object, self.ground.phrase(index)));
+        }
+        let mut guessed = meant.guessed;
+        let mut often = 1;
+        let holds = |literal: Literal, wanted: bool| if wanted { literal } else { literal.negate() };
+        let about = || vec![Term::Object(object)];
+        let literal = match goal {
+            Goal::At { destination, .. } => {
+                let place = self.ground.destination(destination, object, self.current)?;
+                guessed |= place.guessed;
+                Literal::new("at", vec![Term::Object(object), Term::Place(place.value)])
+            }
+            Goal::Holding { held, .. } => holds(Literal::new("holding", about()), *held),
+            Goal::State { predicate, holds: wanted, .. } => holds(Literal::new(predicate, about()), *wanted),
+            Goal::Performed { function, times, .. } => {
+                often = self.number(times)?;
+                Literal::new(function, about())
+            }
+            Goal::Each { .. } | Goal::Find { .. } | Goal::Await { .. } => return Err(missing(object, "it")),
+        };
+        let (want, belief) = match goal {
+            Goal::Performed { function, .. } => {
+                (Want::Perform { function: function.clone(), object }, self.performed(function, object, often, since))
+            }
+            _ => (Want::Holds(literal.clone()), believed(self.view, &literal)),
+        };
+        Ok(Grounded { wants: vec![want], literals: vec![(literal, belief)], times: often, guessed })
+    }
+
+    fn number(&self, times: &Times) -> Result<u32, Stuck> {
+        let index = match times {
+            Times::Count(number) => return Ok(*number),
+            Times::Shown(index) => *index,
+        };
+        let (id, phrase) = (self.ground.object(index)?.value, self.ground.phrase(index));
+        let state = self.view.object(id).map(|entry| entry.state.as_slice()).unwrap_or_default();
+        let shown = state.iter().filter(|literal| literal.predicate == "shows" && !literal.negated);
+        let number = shown.filter_map(|literal| match literal.arguments.get(1) {
+            Some(Term::Number(number)) if (0.0..=MAX_SHOWN).contains(number) => Some(number.round() as u32),
+            _ => None,
+        });
+        number.last().ok_or_else(|| {
+            Stuck::look(GiveUpCause::Perception, format!("I cannot read the number that {phrase} ({id}) shows"))
+        })
+    }
+
+    /// Nothing is done before a condition holds; looking takes time, which the instruction's budget bounds.
+    fn wait(&self, condition: &Condition) -> Result<Next, Stuck> {
+        let (literal, belief) = self.condition(condition)?;
+        self.weigh(&(literal.clone(), belief.clone()));
+        match belief.truth {
+            Truth::Yes => Ok(Next::Reached(format!("{literal}: {}", belief.reason))),
+            _ if self.situation.time >= self.situation.deadline => {
+                let text = format!("the time is over and not {literal}: {}", belief.reason);
+                Err(Stuck::give_up(GiveUpCause::Budget, text))
+            }
+            _ => Ok(Next::Look(format!("I wait until {literal}: {}", belief.reason))),
+        }
+    }
+
+    /// The body's goals for one member after the other.
+    fn each(&self, group: ReferenceIndex, order: &Ordering, body: &[Goal]) -> Result<Next, Stuck> {
+        let members = self.ground.members(group, order)?;
+        for (member, number) in members.iter().zip(1..) {
+            match self.ground.bound(group, *member, || self.in_turn(body))? {
+                Next::Reached(_) => {}
+                Next::Pursue(mut goal) => {
+                    self.note(format!("{member} is number {number} of {}", members.len()));
+                    goal.times += (members.len() * body.len()) as u32;
+                    return Ok(Next::Pursue(goal));
+                }
+                look @ Next::Look(_) => return Ok(look),
+            }
+        }
+        let names: Vec<String> = members.iter().map(ToString::to_string).collect();
+        Ok(Next::Reached(format!("done with each of {}: {}", names.len(), names.join(", "))))
+    }
+
+    /// The goals of one member's turn. What the turn once brought about need not last until its end, but for the last.
+    fn in_turn(&self, body: &[Goal]) -> Result<Next, Stuck> {
+        let mut since = self.since();
+        let mut reached = Next::Reached("nothing is asked of it".into());
+        for (number, goal) in body.iter().enumerate() {
+            self.ground.moved_before.set(body.iter().take(number).any(Goal::moves));
+            let literal = self.ground_goal(goal, since)?.literals.into_iter().next();
+            let when = literal.and_then(|(literal, _)| self.brought_about(&literal, since));
+            if let (Some(moment), true) = (when, number + 1 < body.len()) {
+                since = moment;
+                continue;
+            }
+            reached = self.reach(goal, since)?;
+            if !matches!(reached, Next::Reached(_)) {
+                return Ok(reached);
+            }
+        }
+        Ok(reached)
+    }
+}
