@@ -6,7 +6,7 @@ use crate::{
     ground::{Grounder, Stuck, missing},
     lexicon::Lexicon,
     search::{Found, Limits, Want, search},
-    task::{Destination, Goal, Subtask, Task},
+    task::{Destination, Goal, Subtask, Task, Times},
 };
 use acm_concept::{
     ids::ObjectId,
@@ -71,6 +71,10 @@ impl Mind<'_> {
     fn decide(&self, task: &Task, subtask: &Subtask) -> Result<Decision, Stuck> {
         self.see()?;
         self.look_ahead(task)?;
+        if subtask.when.is_some() {
+            let text = format!("I have no way yet to do \"{}\" only if something holds", subtask.text);
+            return Err(Stuck::give_up(GiveUpCause::Plan, text));
+        }
         let goal = self.ground_goal(task, &subtask.goal)?;
         self.weigh(&goal.literal);
         let (literal, belief) = &goal.literal;
@@ -140,7 +144,8 @@ impl Mind<'_> {
                 }
             }
             if subtask.goal.moves()
-                && let Ok(moved) = self.ground.object(subtask.goal.object())
+                && let Some(object) = subtask.goal.object()
+                && let Ok(moved) = self.ground.object(object)
             {
                 will_be_moved.push(moved.value);
             }
@@ -149,9 +154,14 @@ impl Mind<'_> {
     }
 
     fn ground_goal(&self, task: &Task, goal: &Goal) -> Result<Grounded, Stuck> {
-        let meant = self.ground.object(goal.object())?;
+        let no_way = || {
+            let text = format!("I have no way to do this yet: {}", task.describe(goal));
+            Stuck::give_up(GiveUpCause::Plan, text)
+        };
+        let index = goal.object().ok_or_else(no_way)?;
+        let meant = self.ground.object(index)?;
         let object = meant.value;
-        let phrase = task.references.get(goal.object()).map_or("it", |reference| reference.phrase.as_str());
+        let phrase = task.references.get(index).map_or("it", |reference| reference.phrase.as_str());
         if self.view.object(object).is_none_or(|entry| entry.presence == Presence::Missing) {
             return Err(missing(object, phrase));
         }
@@ -168,10 +178,15 @@ impl Mind<'_> {
                 let wanted = if *held { holding } else { holding.negate() };
                 (Want::Holds(wanted.clone()), wanted, 1)
             }
-            Goal::Performed { function, times, .. } => {
+            Goal::Performed { function, times: Times::Count(times), .. } => {
                 let want = Want::Perform { function: function.clone(), object };
                 (want, Literal::new(function, vec![Term::Object(object)]), *times)
             }
+            Goal::Performed { .. }
+            | Goal::State { .. }
+            | Goal::Each { .. }
+            | Goal::Find { .. }
+            | Goal::Await { .. } => return Err(no_way()),
         };
         let belief = match &want {
             Want::Holds(literal) => self.view.belief(literal),

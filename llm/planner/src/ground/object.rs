@@ -8,7 +8,7 @@ use super::{
 use crate::{
     decision::GiveUpCause,
     explanation::ResolvedReference,
-    task::{Destination, Direction, Goal, ObjectReference, Quantity, Rank, ReferenceIndex, Size},
+    task::{Destination, Goal, ObjectReference, Quantity, Rank, ReferenceIndex, Size},
 };
 use acm_concept::{ids::ObjectId, task::OnUnknown};
 use acm_memory::{
@@ -150,7 +150,7 @@ impl<'a> Grounder<'a> {
     /// "Put the cube back where it was" speaks of a cube that has been moved, unless the instruction itself has it moved
     /// before.
     fn presupposes_move(&self, index: ReferenceIndex) -> bool {
-        let moving = self.task.subtasks.iter().map(|subtask| &subtask.goal).find(|g| g.object() == index && g.moves());
+        let moving = self.task.subtasks.iter().map(|subtask| &subtask.goal).find(|g| g.object() == Some(index) && g.moves());
         let back = PlaceReference::BeforeMoved;
         matches!(moving, Some(Goal::At { destination: Destination::History { object, reference }, .. })
             if *object == index && *reference == back)

@@ -37,7 +37,11 @@ impl Grounder<'_> {
                 let place = self.remembered(*object, of.value, *reference, subtask)?;
                 Ok(Meant { value: place.value, guessed: place.guessed || of.guessed })
             }
-            Destination::Exchanged { with, first } => self.exchanged(*with, *first, moved, subtask),
+            Destination::Exchanged { heading: true, .. } => {
+                let text = "I have no way yet to give a thing the heading of another".to_owned();
+                Err(Stuck::give_up(GiveUpCause::Plan, text))
+            }
+            Destination::Exchanged { with, first, .. } => self.exchanged(*with, *first, moved, subtask),
             other => self.spot(other, moved, 0),
         }
     }
@@ -59,6 +63,10 @@ impl Grounder<'_> {
                 Ok(Meant { value: self.standing_at(spot, moved), guessed: a.guessed || b.guessed })
             }
             Destination::Beside { reference, side } => self.beside(*reference, *side, moved, depth),
+            Destination::In { reference } | Destination::Under { reference } => {
+                let text = format!("I have no way yet to tell the place in or under {}", self.phrase(*reference));
+                Err(Stuck::give_up(GiveUpCause::Plan, text))
+            }
             Destination::History { .. } | Destination::Exchanged { .. } => {
                 let text = "a thing cannot be told apart by where it was once".to_owned();
                 Err(Stuck::give_up(GiveUpCause::Plan, text))
