@@ -35,4 +35,4 @@ pub use hybrid::TaskPrompt;
 pub use language::ParseError;
 pub use lexicon::{Lexicon, LexiconError};
 pub use planner::{Planner, embedded_lexicon};
-pub use task::{Destination, Goal, ObjectReference, Span, Subtask, Task};
+pub use task::{Condition, Destination, Goal, ObjectReference, Span, Subtask, Task, Times};

@@ -1,9 +1,10 @@
 //! What an instruction asks for: goals over references that are resolved when their subtask is due.
 
+mod words;
+
 use acm_concept::{color::Lab, template::TemplateLibrary};
 use acm_memory::query::PlaceReference;
 use serde::{Deserialize, Serialize};
-use std::fmt;
 
 /// Bytes `start..end` of the instruction.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -39,6 +40,30 @@ pub struct Task {
     pub untouched: Vec<ReferenceIndex>,
     /// The library's nouns that the instruction uses, for the prior of perception.
     pub nouns: Vec<String>,
+    /// What the instruction says of the way of doing it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub manners: Vec<Manner>,
+}
+
+/// What an instruction says of the way of doing it: it asks for no goal of its own.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Manner {
+    /// Where the words stand in the instruction.
+    pub span: Span,
+    /// What they say.
+    pub kind: MannerKind,
+}
+
+/// Kinds of [`Manner`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum MannerKind {
+    /// One thing after the other ("one cube at a time"): a hand that holds one thing does so anyway.
+    OneAtATime,
+    /// Never two things in one place: no plan puts a thing where another one stands.
+    OneToAPlace,
+    /// A place for what has to be put aside ("using the spare tray").
+    Aside(ReferenceIndex),
 }
 
 /// Index into [`Task::references`]. Two phrases that mean the same thing have the same index.
@@ -53,7 +78,7 @@ pub struct Subtask {
     pub span: Span,
     /// What shall be so.
     pub goal: Goal,
-    /// What must hold when the subtask is due: where it does not, nothing is done ("if the drawer is open, close it").
+    /// What must hold for the subtask to be done; where it does not, nothing is done ("if the drawer is open, close it").
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub when: Option<Condition>,
 }
@@ -67,16 +92,22 @@ pub struct Condition {
     pub arguments: Vec<ReferenceIndex>,
     /// Whether it must not hold.
     pub negated: bool,
+    /// The subtask at whose beginning it is judged, where that is not the moment at which it is asked: what depends on
+    /// one "if" is judged once, and so is its "otherwise".
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub judged_at: Option<u32>,
 }
 
 /// How often something is done.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Times {
     /// A number that the instruction names.
     Count(u32),
     /// The number that a thing shows ("as often as the card says").
     Shown(ReferenceIndex),
+    /// Again and again until something holds ("until the lid is open").
+    Until(Condition),
 }
 
 /// In which order the members of a group are taken.
@@ -181,6 +212,30 @@ impl Goal {
             Goal::Await { .. } => None,
         }
     }
+    /// All things that the goal names, without those that only describe them.
+    pub fn references(&self) -> Vec<ReferenceIndex> {
+        let mut named: Vec<ReferenceIndex> = self.object().into_iter().collect();
+        let condition = |condition: &Option<Condition>| condition.iter().flat_map(|c| c.arguments.clone()).collect();
+        let more: Vec<ReferenceIndex> = match self {
+            Goal::At { destination, .. } => destination.references(),
+            Goal::Performed { times: Times::Shown(by), .. } => vec![*by],
+            Goal::Performed { times: Times::Until(until), .. } => until.arguments.clone(),
+            Goal::Holding { .. } | Goal::Performed { .. } | Goal::State { .. } => Vec::new(),
+            Goal::Each { order, body, .. } => {
+                let named = if let Ordering::Named(named) = order { named.clone() } else { Vec::new() };
+                named.into_iter().chain(body.iter().flat_map(Goal::references)).collect()
+            }
+            Goal::Find { within, probe, sign, .. } => {
+                let mut more: Vec<ReferenceIndex> = condition(sign);
+                more.extend(within.iter().flat_map(Destination::references));
+                more.extend(probe.iter().flat_map(|probe| probe.references()));
+                more
+            }
+            Goal::Await { condition } => condition.arguments.clone(),
+        };
+        named.extend(more);
+        named
+    }
     /// Whether reaching the goal may move its object.
     pub fn moves(&self) -> bool {
         match self {
@@ -236,6 +291,8 @@ pub enum Destination {
         with: ReferenceIndex,
         /// Whether this is the first of the two.
         first: bool,
+        /// Whether it also takes over the other's heading.
+        heading: bool,
     },
     /// Where an object was.
     History {
@@ -244,6 +301,22 @@ pub enum Destination {
         /// Which of its places.
         reference: PlaceReference,
     },
+}
+
+impl Destination {
+    /// The things that it names.
+    pub fn references(&self) -> Vec<ReferenceIndex> {
+        match self {
+            Destination::On { reference }
+            | Destination::In { reference }
+            | Destination::Under { reference }
+            | Destination::Beside { reference, .. } => vec![*reference],
+            Destination::Middle { of } => of.iter().copied().collect(),
+            Destination::Between { first, second } => vec![*first, *second],
+            Destination::Exchanged { with, .. } => vec![*with],
+            Destination::History { object, .. } => vec![*object],
+        }
+    }
 }
 
 /// A direction as seen by somebody who stands behind the robot's base: world x points right, world y away.
@@ -360,12 +433,24 @@ pub struct ObjectReference {
     /// What it looks like in shape and colour ("its twin"), without being it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub twin_of: Option<ReferenceIndex>,
+    /// What stands on it or lies in it ("the mat with the cube on it").
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub contains: Vec<ReferenceIndex>,
     /// States that it must be in when it is due, and whether they must hold ("the open drawer", "a sliced apple").
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub states: Vec<(String, bool)>,
     /// Which one by what was done with it in this episode ("the one you took first").
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub handled: Option<Handled>,
+}
+
+impl ObjectReference {
+    /// The things that describe it.
+    pub fn references(&self) -> Vec<ReferenceIndex> {
+        let located = self.located.as_deref().map(Destination::references).unwrap_or_default();
+        let wholes = self.part_of.into_iter().chain(self.twin_of);
+        located.into_iter().chain(self.other_than.iter().copied()).chain(wholes).chain(self.contains.clone()).collect()
+    }
 }
 
 /// A choice by what the agent did, from its own transitions.
@@ -375,70 +460,6 @@ pub struct Handled {
     pub effect: String,
     /// Which one in time, counted from 0; from the last one if negative (-1).
     pub rank: i32,
-}
-
-impl Task {
-    /// The goals alone, one a line, with things numbered in the order in which they are named. Two instructions
-    /// that ask for the same have the same outline, whatever nouns and colours they use.
-    pub fn outline(&self) -> Vec<String> {
-        let mut order: Vec<ReferenceIndex> = Vec::new();
-        let mut number = |index: ReferenceIndex| match order.iter().position(|&known| known == index) {
-            Some(place) => format!("#{place}"),
-            None => {
-                order.push(index);
-                format!("#{}", order.len() - 1)
-            }
-        };
-        let mut lines = Vec::with_capacity(self.subtasks.len());
-        for subtask in &self.subtasks {
-            lines.push(match &subtask.goal {
-                Goal::At { object, destination } => {
-                    let object = number(*object);
-                    let to = match destination {
-                        Destination::On { reference } => format!("on {}", number(*reference)),
-                        Destination::Middle { .. } => "middle".into(),
-                        Destination::Between { first, second } => {
-                            format!("between {} and {}", number(*first), number(*second))
-                        }
-                        Destination::Beside { reference, side } => format!("beside {} {side:?}", number(*reference)),
-                        Destination::Exchanged { with, .. } => format!("in place of {}", number(*with)),
-                        Destination::History { object, reference } => format!("{reference:?} of {}", number(*object)),
-                    };
-                    format!("at({object}, {to})")
-                }
-                Goal::Holding { object, held: true } => format!("holding({})", number(*object)),
-                Goal::Holding { object, held: false } => format!("not holding({})", number(*object)),
-                Goal::Performed { function, object, times } => format!("{function}({}) x{times}", number(*object)),
-            });
-        }
-        lines
-    }
-    /// A goal in words.
-    pub fn describe(&self, goal: &Goal) -> String {
-        let name = |index: &ReferenceIndex| {
-            self.references.get(*index).map_or_else(|| format!("reference {index}"), |r| format!("\"{}\"", r.phrase))
-        };
-        match goal {
-            Goal::At { object, destination } => match destination {
-                Destination::On { reference } => format!("{} stands on {}", name(object), name(reference)),
-                Destination::Middle { of: Some(group) } => {
-                    format!("{} stands in the middle of {}", name(object), name(group))
-                }
-                Destination::Middle { of: None } => format!("{} stands in the middle of the places", name(object)),
-                Destination::Between { first, second } => {
-                    format!("{} stands between {} and {}", name(object), name(first), name(second))
-                }
-                Destination::Beside { reference, .. } => format!("{} stands beside {}", name(object), name(reference)),
-                Destination::Exchanged { with, .. } => format!("{} stands where {} stood", name(object), name(with)),
-                Destination::History { object: of, reference } => {
-                    format!("{} stands {}", name(object), history_phrase(*reference, &name(of)))
-                }
-            },
-            Goal::Holding { object, held: true } => format!("{} is in the hand", name(object)),
-            Goal::Holding { object, held: false } => format!("{} is put down", name(object)),
-            Goal::Performed { function, object, times } => format!("{function} {} x{times}", name(object)),
-        }
-    }
 }
 
 /// "where X came from" and its like.
@@ -461,14 +482,4 @@ pub(crate) fn functions_with_effect<'a>(library: &'a TemplateLibrary, predicate:
     names.sort_unstable();
     names.dedup();
     names
-}
-
-impl fmt::Display for Task {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (index, subtask) in self.subtasks.iter().enumerate() {
-            let separator = if index == 0 { "" } else { "; " };
-            write!(f, "{separator}{}. {}", index + 1, self.describe(&subtask.goal))?;
-        }
-        Ok(())
-    }
 }

@@ -38,6 +38,7 @@ fn task(references: Vec<ObjectReference>, goals: Vec<Goal>) -> Task {
         references,
         untouched: Vec::new(),
         nouns: Vec::new(),
+        manners: Vec::new(),
     }
 }
 
@@ -58,10 +59,13 @@ fn try_ways_round(right: Option<[bool; 2]>) -> (Decision, World, Vec<[bool; 2]>)
     let cells = [world.cell(DVec2::new(-0.1, 0.0)), world.cell(DVec2::new(0.1, 0.0))];
     let gauge = world.button(DVec2::new(0.0, 0.25));
     world.visible.insert("turned".into());
-    let sign = Condition { predicate: "turned".into(), arguments: vec![1], negated: false };
+    let sign = Condition { predicate: "turned".into(), arguments: vec![1], negated: false, judged_at: None };
     let find = Goal::Find { members: 0, vary: Variation::Heading, within: None, probe: None, sign: Some(sign) };
     let task = task(vec![noun("cell", Quantity::Group), noun("button", Quantity::TheOne)], vec![find]);
-    let mut stood: Vec<[bool; 2]> = Vec::new();
+    let mut stood = vec![[false, false]];
+    if right == Some([false, false]) {
+        world.facts.insert(format!("turned({gauge})"));
+    }
     let end = run(&mut world, &task, &abstain(), |world, _| {
         if world.objects.iter().any(|entry| entry.place().is_none()) {
             return;
@@ -242,7 +246,7 @@ fn a_button_is_pressed_as_often_as_a_card_shows_and_what_it_shows_must_be_read()
 #[test]
 fn a_condition_decides_whether_anything_is_done_and_a_wait_ends_when_it_holds() {
     let press = Goal::Performed { function: "press".into(), object: 0, times: Times::Count(1) };
-    let lit = Condition { predicate: "lit".into(), arguments: vec![0], negated: false };
+    let lit = Condition { predicate: "lit".into(), arguments: vec![0], negated: false, judged_at: None };
     for (holds, presses) in [(true, 1), (false, 0)] {
         let mut world = World::new();
         let button = world.button(DVec2::new(-0.2, -0.1));
@@ -281,7 +285,7 @@ fn the_one_of_several_that_gives_the_sign_is_found_and_the_others_are_not_tried_
         let lamp = world.cube(DVec2::new(0.0, 0.2), RED, None);
         world.visible.insert("lit".into());
         let press = Goal::Performed { function: "press".into(), object: 0, times: Times::Count(1) };
-        let sign = Condition { predicate: "lit".into(), arguments: vec![1], negated: false };
+        let sign = Condition { predicate: "lit".into(), arguments: vec![1], negated: false, judged_at: None };
         let find = Goal::Find {
             members: 0,
             vary: Variation::Choice,
@@ -312,8 +316,10 @@ fn equal_memories_give_equal_decisions_in_the_middle_of_a_trial() {
     let mut again = 0;
     run(&mut world, &task, &abstain(), |world, _| {
         let decide = || planner.decide(&task, world, &situation(world, 0), &abstain());
-        assert_eq!(decide(), decide());
-        again += 1;
+        if !matches!(decide(), Decision::Done { .. }) {
+            assert_eq!(decide(), decide());
+            again += 1;
+        }
     });
     assert!(again > 10);
 }

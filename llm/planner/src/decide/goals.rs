@@ -4,14 +4,17 @@ use super::{Grounded, MAX_LOOKS, Mind};
 use crate::{
     decision::GiveUpCause,
     ground::{Stuck, missing},
-    search::{Want, believed},
+    search::{Want, believed, same_atom},
     task::{Condition, Goal, Ordering, ReferenceIndex, Subtask, Times},
 };
-use acm_concept::literal::{Belief, Literal, Term, Truth};
+use acm_concept::ids::ObjectId;
+use acm_concept::literal::{Belief, Evidence, Literal, Term, Truth};
 use acm_memory::entry::{Moment, Presence};
 
 /// The most that is done for one number that a thing shows.
 const MAX_SHOWN: f64 = 99.0;
+/// The most that one thing is done until something holds.
+const MAX_UNTIL: u32 = 12;
 
 /// What a goal asks for next.
 pub(super) enum Next {
@@ -24,11 +27,11 @@ pub(super) enum Next {
 }
 
 impl Mind<'_> {
-    /// For a subtask with a condition: how it ends where the condition does not hold. Once something was done for the
-    /// subtask its condition is not asked again, which that may have changed.
+    /// For a subtask with a condition: how it ends where the condition does not hold.
     pub(super) fn not_asked_for(&self, subtask: &Subtask) -> Result<Option<Next>, Stuck> {
-        let Some(when) = subtask.when.as_ref().filter(|_| self.tries().next().is_none()) else { return Ok(None) };
-        let (literal, belief) = self.condition(when)?;
+        let Some(when) = &subtask.when else { return Ok(None) };
+        let (literal, now) = self.condition(when)?;
+        let belief = self.judged(&literal, when.judged_at.unwrap_or(self.current)).unwrap_or(now);
         self.weigh(&(literal.clone(), belief.clone()));
         match belief.truth {
             Truth::Yes => Ok(None),
@@ -38,6 +41,19 @@ impl Mind<'_> {
                 Err(Stuck::look(GiveUpCause::Memory, text))
             }
         }
+    }
+
+    /// What was believed of a literal before own actions since the beginning of a subtask could have changed it; `None`
+    /// where none could.
+    fn judged(&self, literal: &Literal, subtask: u32) -> Option<Belief> {
+        let since = self.ground.began(subtask)?;
+        let own = self.view.transitions().iter().filter(|t| t.moment >= since && t.subtask.is_some());
+        own.into_iter().find_map(|transition| {
+            let before = transition.before.iter().find(|before| same_atom(before, literal))?;
+            let truth = if before.negated == literal.negated { Truth::Yes } else { Truth::No };
+            let reason = format!("{before} before {}", transition.id);
+            Some(Belief { truth, confidence: 0.9, evidence: vec![Evidence::Transition(transition.id)], reason })
+        })
     }
 
     /// A condition as a ground literal with what is believed of it.
@@ -110,24 +126,59 @@ impl Mind<'_> {
             Goal::Holding { held, .. } => holds(Literal::new("holding", about()), *held),
             Goal::State { predicate, holds: wanted, .. } => holds(Literal::new(predicate, about()), *wanted),
             Goal::Performed { function, times, .. } => {
-                often = self.number(times)?;
+                often = self.number(times, function, object, since)?;
                 Literal::new(function, about())
             }
             Goal::Each { .. } | Goal::Find { .. } | Goal::Await { .. } => return Err(missing(object, "it")),
         };
-        let (want, belief) = match goal {
-            Goal::Performed { function, .. } => {
-                (Want::Perform { function: function.clone(), object }, self.performed(function, object, often, since))
-            }
-            _ => (Want::Holds(literal.clone()), believed(self.view, &literal)),
-        };
-        Ok(Grounded { wants: vec![want], literals: vec![(literal, belief)], times: often, guessed })
+        if let Goal::Performed { function, .. } = goal {
+            let belief = self.performed(function, object, often, since);
+            let wants = vec![Want::Perform { function: function.clone(), object }];
+            return Ok(Grounded { wants, literals: vec![(literal, belief)], times: often, guessed });
+        }
+        // What had to be taken in the hand for a state is put down again before the state counts as reached.
+        let empty = matches!(goal, Goal::State { .. }) && self.holds_unasked();
+        let literals = [literal].into_iter().chain(empty.then(|| Literal::new("hand-empty", Vec::new())));
+        let literals: Vec<_> = literals.map(|literal| (literal.clone(), believed(self.view, &literal))).collect();
+        let wants = literals.iter().map(|(literal, _)| Want::Holds(literal.clone())).collect();
+        Ok(Grounded { wants, literals, times: often, guessed })
     }
 
-    fn number(&self, times: &Times) -> Result<u32, Stuck> {
+    /// Whether something is in the hand that no subtask done so far has asked to hold.
+    fn holds_unasked(&self) -> bool {
+        let asked = |held: ObjectId| {
+            let done = self.task.subtasks.iter().take(self.current as usize);
+            done.into_iter().any(|subtask| match &subtask.goal {
+                Goal::Holding { object, held: true } => self.ground.object(*object).is_ok_and(|of| of.value == held),
+                _ => false,
+            })
+        };
+        self.view.held().is_some_and(|entry| !asked(entry.id))
+    }
+
+    /// How often a function is asked for on an object.
+    fn number(&self, times: &Times, function: &str, object: ObjectId, since: Moment) -> Result<u32, Stuck> {
         let index = match times {
             Times::Count(number) => return Ok(*number),
             Times::Shown(index) => *index,
+            Times::Until(until) => {
+                let (literal, belief) = self.condition(until)?;
+                self.weigh(&(literal.clone(), belief.clone()));
+                let done =
+                    self.successes(since).filter(|t| t.skill() == function && t.object() == object).count() as u32;
+                return match belief.truth {
+                    Truth::Yes => Ok(done),
+                    _ if done >= MAX_UNTIL => {
+                        let text = format!("{function} of {object} was done {done} times and still not {literal}");
+                        Err(Stuck::give_up(GiveUpCause::Plan, text))
+                    }
+                    Truth::No => Ok(done + 1),
+                    Truth::Unknown => {
+                        let text = format!("I cannot tell whether {literal}: {}", belief.reason);
+                        Err(Stuck::look(GiveUpCause::Perception, text))
+                    }
+                };
+            }
         };
         let (id, phrase) = (self.ground.object(index)?.value, self.ground.phrase(index));
         let state = self.view.object(id).map(|entry| entry.state.as_slice()).unwrap_or_default();

@@ -6,7 +6,7 @@
 use super::{Grounded, MAX_LOOKS, Mind, goals::Next};
 use crate::{
     decision::GiveUpCause,
-    ground::{HEADING_TOLERANCE_RAD, Stuck, place_at},
+    ground::{HEADING_TOLERANCE_RAD, PLACE_TOLERANCE_M, Stuck, missing, place_at},
     search::Want,
     task::{Condition, Destination, Goal, Ordering, ReferenceIndex, Variation},
 };
@@ -15,7 +15,7 @@ use acm_concept::{
     literal::{Literal, Place, Term, Truth},
     pose::Pose,
 };
-use acm_memory::entry::{Moment, ObjectEntry};
+use acm_memory::entry::{Moment, ObjectEntry, Presence};
 use std::f64::consts::PI;
 
 /// More ways than this are not tried.
@@ -34,6 +34,10 @@ impl Mind<'_> {
         sign: Option<&Condition>,
     ) -> Result<Next, Stuck> {
         let members = self.ground.members(group, &Ordering::Any)?;
+        let gone = |member: &&ObjectId| self.view.object(**member).is_none_or(|e| e.presence == Presence::Missing);
+        if let Some(member) = members.iter().find(gone) {
+            return Err(missing(*member, self.ground.phrase(group)));
+        }
         let seen = match self.sign(sign)? {
             Sign::Shows(reason) => return Ok(Next::Reached(reason)),
             Sign::Look(reason) => return Ok(Next::Look(reason)),
@@ -44,7 +48,7 @@ impl Mind<'_> {
             return self.find_member(group, &members, probe, seen);
         }
         let ways = self.arrangements(vary, &members, within)?;
-        let tried = self.tried(&members, &ways, probe, seen)?;
+        let tried = self.tried(&members, &ways, probe)?;
         let standing = self.standing(&members, None);
         let moves = |way: &Arrangement| way.iter().zip(&standing).filter(|(to, at)| !is_at(to, at.as_ref())).count();
         let open = ways.iter().enumerate().filter(|(index, _)| !tried.contains(index));
@@ -152,8 +156,8 @@ impl Mind<'_> {
                 Some(destination) => self.ground.destination(destination, *member, self.current)?.value,
                 None => {
                     let stood = self.view.object(*member).and_then(|entry| place_at(entry, began));
-                    let (pose, support) = stood.ok_or_else(|| crate::ground::missing(*member, "one of them"))?;
-                    Place { support, pose, tolerance_m: crate::ground::PLACE_TOLERANCE_M, heading_tolerance_rad: None }
+                    let (pose, support) = stood.ok_or_else(|| missing(*member, "one of them"))?;
+                    Place { support, pose, tolerance_m: PLACE_TOLERANCE_M, heading_tolerance_rad: None }
                 }
             };
             homes.push(place);
@@ -182,15 +186,8 @@ impl Mind<'_> {
         Ok((0..1usize << members.len()).map(turned).collect())
     }
 
-    /// Which ways were tried: those that stood when the probe took effect, or, without a probe, all that ever stood since
-    /// the sign can be seen.
-    fn tried(
-        &self,
-        members: &[ObjectId],
-        ways: &[Arrangement],
-        probe: Option<&Goal>,
-        seen: bool,
-    ) -> Result<Vec<usize>, Stuck> {
+    /// Which ways were tried: those that stood when the probe took effect, or, without a probe, all that ever stood.
+    fn tried(&self, members: &[ObjectId], ways: &[Arrangement], probe: Option<&Goal>) -> Result<Vec<usize>, Stuck> {
         let moments: Vec<Option<Moment>> = match probe {
             Some(Goal::Performed { function, object, .. }) => {
                 let object = self.ground.object(*object)?.value;
@@ -201,8 +198,10 @@ impl Mind<'_> {
                 let text = "what tries an arrangement must be something that is done to a thing".to_owned();
                 return Err(Stuck::give_up(GiveUpCause::Plan, text));
             }
-            None if seen => self.successes(self.since()).map(|t| Some(t.moment)).chain([None]).collect(),
-            None => self.successes(self.since()).map(|t| Some(t.moment)).collect(),
+            None => {
+                let since = self.since();
+                [Some(since), None].into_iter().chain(self.successes(since).map(|t| Some(t.moment))).collect()
+            }
         };
         let mut tried: Vec<usize> = Vec::new();
         for moment in moments {

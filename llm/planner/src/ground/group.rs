@@ -7,7 +7,7 @@ use crate::{
     task::{Direction, Ordering, Quantity, ReferenceIndex},
 };
 use acm_concept::ids::ObjectId;
-use acm_memory::entry::{ObjectEntry, Presence};
+use acm_memory::entry::ObjectEntry;
 
 impl Grounder<'_> {
     /// What a closure gives while a group's reference means one of its members.
@@ -33,8 +33,7 @@ impl Grounder<'_> {
         }
         let reference = self.reference(group)?;
         let (retrieval, contenders) = self.contenders(group, reference, 0)?;
-        let known = contenders.into_iter().filter(|entry| entry.presence != Presence::Missing).collect();
-        let mut members = self.confirmed(known)?;
+        let mut members = self.confirmed(contenders)?;
         if let Ordering::From(side) = order {
             let began = self.began(reference.subtask);
             let along = |entry: &&ObjectEntry| {

@@ -8,7 +8,7 @@ use super::{
 use crate::{
     decision::GiveUpCause,
     explanation::ResolvedReference,
-    task::{Destination, Direction, Goal, ObjectReference, Quantity, Rank, ReferenceIndex, Size},
+    task::{Destination, Goal, ObjectReference, Quantity, Rank, ReferenceIndex, Size},
 };
 use acm_concept::{ids::ObjectId, task::OnUnknown};
 use acm_memory::{

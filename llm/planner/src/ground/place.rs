@@ -1,7 +1,7 @@
 //! Which place a destination means.
 
 use super::{
-    Grounder, MAX_DEPTH, Meant, PLACE_TOLERANCE_M, Stuck,
+    Grounder, HEADING_TOLERANCE_RAD, MAX_DEPTH, Meant, PLACE_TOLERANCE_M, Stuck,
     geometry::{Extent, symmetry, top_centre},
     has_effect,
     history::place_at,
@@ -39,7 +39,14 @@ impl Grounder<'_> {
                 let place = self.remembered(*object, of.value, *reference, subtask)?;
                 Ok(Meant { value: place.value, guessed: place.guessed || of.guessed })
             }
-            Destination::Exchanged { with, first } => self.exchanged(*with, *first, moved, subtask),
+            Destination::Exchanged { with, first, heading } => {
+                let mut place = self.exchanged(*with, *first, moved, subtask)?;
+                if let (true, Some(yaw)) = (heading, self.stood(*with, *first, subtask)?.map(|(pose, _)| pose.yaw())) {
+                    place.value.pose = Pose::from_yaw(place.value.pose.translation, yaw);
+                    place.value.heading_tolerance_rad = Some(HEADING_TOLERANCE_RAD);
+                }
+                Ok(place)
+            }
             other => self.spot(other, moved, 0),
         }
     }
@@ -83,9 +90,7 @@ impl Grounder<'_> {
             let text = format!("{phrase} is {moved} itself: nothing changes places with itself");
             return Err(Stuck::give_up(GiveUpCause::Plan, text));
         }
-        let began = if first { Some(subtask) } else { subtask.checked_sub(1) }.and_then(|since| self.began(since));
-        let stood = self.view.object(other.value).and_then(|entry| place_at(entry, began));
-        let (pose, support) = stood.ok_or_else(|| missing(other.value, phrase))?;
+        let (pose, support) = self.stood(with, first, subtask)?.ok_or_else(|| missing(other.value, phrase))?;
         if support == Some(moved) {
             let text = format!("{phrase} ({}) stands on {moved}: the two cannot change places", other.value);
             return Err(Stuck::give_up(GiveUpCause::Plan, text));
@@ -100,6 +105,18 @@ impl Grounder<'_> {
             heading_tolerance_rad: None,
         };
         Ok(Meant { value: place, guessed: other.guessed })
+    }
+
+    /// Where a thing stood, and what carried it, when its exchange with another began.
+    fn stood(
+        &self,
+        with: ReferenceIndex,
+        first: bool,
+        subtask: u32,
+    ) -> Result<Option<(Pose, Option<ObjectId>)>, Stuck> {
+        let began = if first { Some(subtask) } else { subtask.checked_sub(1) }.and_then(|since| self.began(since));
+        let other = self.object(with)?.value;
+        Ok(self.view.object(other).and_then(|entry| place_at(entry, began)))
     }
 
     fn on(&self, reference: ReferenceIndex, moved: ObjectId, depth: u32) -> Result<Meant<Place>, Stuck> {

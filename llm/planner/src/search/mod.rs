@@ -13,9 +13,10 @@ use acm_concept::{
     literal::{Belief, Literal, Place, Term, Truth},
 };
 use acm_memory::{MemoryView, query::SkillCandidate};
-use state::{State, same_atom};
+use state::State;
 
 pub(crate) use derived::brings_about;
+pub(crate) use state::same_atom;
 use std::{
     cmp::Ordering,
     collections::{BTreeMap, BinaryHeap},

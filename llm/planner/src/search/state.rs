@@ -22,8 +22,9 @@ use std::collections::BTreeMap;
 const TOUCH_M: f64 = 0.003;
 /// Distance that is kept round things put aside, metres.
 const CLEARANCE_M: f64 = 0.03;
-/// How far beyond the outermost things a free spot is looked for, metres.
-const MARGIN_M: f64 = 0.05;
+/// How far beyond the outermost things a free spot is looked for, metres: farther where there is none nearer, since
+/// nothing is known of the table's edge and of the arm's reach there.
+const MARGINS_M: [f64; 3] = [0.05, 0.12, 0.2];
 /// Rings on which free spots are looked for: first radius, step, and number, metres.
 const RINGS_M: (f64, f64, u32) = (0.08, 0.03, 14);
 /// Spots on a ring.
@@ -222,8 +223,8 @@ impl<'v> State<'v> {
         let spots: Vec<DVec2> = standing.iter().map(|(_, pose)| flat(pose)).collect();
         let middle = spots.iter().sum::<DVec2>() / spots.len().max(1) as f64;
         let start = self.standing(entry).map_or(middle, |pose| flat(&pose));
-        let low = spots.iter().fold(start, |a, b| a.min(*b)) - MARGIN_M;
-        let high = spots.iter().fold(start, |a, b| a.max(*b)) + MARGIN_M;
+        let known = || spots.iter().copied().chain(reserved.iter().map(|(_, place)| flat(&place.pose)));
+        let (low, high) = (known().fold(start, DVec2::min), known().fold(start, DVec2::max));
         let taken = |keep_off_flat: bool| -> Vec<Extent> {
             let things = standing
                 .iter()
@@ -234,10 +235,11 @@ impl<'v> State<'v> {
             extents.chain(reserved).collect()
         };
         let yaw = entry.pose().map_or(0.0, |pose| pose.yaw());
-        for keep_off_flat in [true, false] {
+        for (keep_off_flat, margin) in [true, false].into_iter().flat_map(|keep| MARGINS_M.map(|margin| (keep, margin)))
+        {
             let taken = taken(keep_off_flat);
             for spot in ring_spots(start) {
-                let inside = spot.cmpge(low).all() && spot.cmple(high).all();
+                let inside = spot.cmpge(low - margin).all() && spot.cmple(high + margin).all();
                 let place = self.place_at(spot, object, yaw);
                 let extent = place.and_then(|place| Extent::at(self.view, entry, &place.pose));
                 let free = |extent: &Extent| taken.iter().all(|other| other.gap(extent) > CLEARANCE_M);
@@ -284,7 +286,7 @@ fn inferred(holds: bool, how: &str) -> Belief {
 }
 
 /// Whether two literals speak of the same, whatever their signs. Places are the same within a micrometre.
-pub(super) fn same_atom(a: &Literal, b: &Literal) -> bool {
+pub(crate) fn same_atom(a: &Literal, b: &Literal) -> bool {
     let same_term = |a: &Term, b: &Term| match (a, b) {
         (Term::Place(a), Term::Place(b)) => a.pose.translation.distance(b.pose.translation) < 1e-6,
         (Term::Object(id), Term::Part(part)) | (Term::Part(part), Term::Object(id)) => part.object == *id,

@@ -1,6 +1,7 @@
 //! A symbolic world with a memory of it: objects stand where they were put, skills bring about their declared
 //! effects unless a fault is scripted. It implements [`MemoryView`] on its own, so that the planner is tested
 //! against the interface and not against one memory.
+#![allow(dead_code, reason = "each test program uses a part of it")]
 
 use acm_concept::{
     color::{Appearance, Lab},
