@@ -136,12 +136,25 @@ impl Mind<'_> {
             let wants = vec![Want::Perform { function: function.clone(), object }];
             return Ok(Grounded { wants, literals: vec![(literal, belief)], times: often, guessed });
         }
-        // What had to be taken in the hand for a state is put down again before the state counts as reached.
-        let empty = matches!(goal, Goal::State { .. }) && self.holds_unasked();
-        let literals = [literal].into_iter().chain(empty.then(|| Literal::new("hand-empty", Vec::new())));
-        let literals: Vec<_> = literals.map(|literal| (literal.clone(), believed(self.view, &literal))).collect();
-        let wants = literals.iter().map(|(literal, _)| Want::Holds(literal.clone())).collect();
-        Ok(Grounded { wants, literals, times: often, guessed })
+        let belief = believed(self.view, &literal);
+        let wants = vec![Want::Holds(literal.clone())];
+        Ok(Grounded { wants, literals: vec![(literal, belief)], times: often, guessed })
+    }
+
+    /// What had to be taken in the hand for a state of other things is put down again before the subtask counts as done.
+    pub(super) fn hands_free(&self, goal: &Goal) -> Option<Grounded> {
+        let changes = |goal: &Goal| matches!(goal, Goal::State { .. });
+        let asks = match goal {
+            Goal::Each { body, .. } => body.last().is_some_and(changes),
+            goal => changes(goal),
+        };
+        if !asks || !self.holds_unasked() {
+            return None;
+        }
+        let literal = Literal::new("hand-empty", Vec::new());
+        let belief = believed(self.view, &literal);
+        let wants = vec![Want::Holds(literal.clone())];
+        Some(Grounded { wants, literals: vec![(literal, belief)], times: 1, guessed: false })
     }
 
     /// Whether something is in the hand that no subtask done so far has asked to hold.

@@ -84,10 +84,13 @@ impl Mind<'_> {
     fn decide(&self, subtask: &Subtask) -> Result<Decision, Stuck> {
         self.see()?;
         self.look_ahead()?;
-        let next = match self.not_asked_for(subtask)? {
+        let mut next = match self.not_asked_for(subtask)? {
             Some(next) => next,
             None => self.next(&subtask.goal)?,
         };
+        if let (Next::Reached(_), Some(goal)) = (&next, self.hands_free(&subtask.goal)) {
+            next = Next::Pursue(Box::new(goal));
+        }
         match next {
             Next::Reached(reason) => Ok(Decision::SubtaskDone { index: self.current, reason, grounds: self.grounds() }),
             Next::Look(reason) => Ok(self.look(reason)),

@@ -192,7 +192,7 @@ impl<'v> Search<'v, '_> {
                     return None;
                 }
                 Item::PutAside(object) => {
-                    let Some(spot) = node.state.free_spot(object, &self.reserved) else {
+                    let Some(spot) = node.state.free_spot(object, &self.spoken_for(&node.agenda)) else {
                         self.reject(format!("moving {object} away"), None, "I see no free spot for it".into());
                         return None;
                     };
@@ -225,6 +225,15 @@ impl<'v> Search<'v, '_> {
             }
         }
         Some(node)
+    }
+
+    /// Places where something shall come to stand: for the goals, and for the steps that are planned already.
+    fn spoken_for(&self, agenda: &[Item]) -> Vec<(ObjectId, Place)> {
+        let planned = agenda.iter().filter_map(|item| match item {
+            Item::Apply { candidate, .. } => Some((candidate.part.object, candidate.destination?)),
+            _ => None,
+        });
+        self.reserved.iter().copied().chain(planned).collect()
     }
 
     fn truth(&self, node: &Node<'v>, condition: &Condition) -> Truth {
@@ -322,7 +331,7 @@ impl<'v> Search<'v, '_> {
         let Some(object) = literal.subject().or_else(|| node.state.held()) else { return Vec::new() };
         let mut candidates = self.view.skill_candidates(object, destination);
         if destination.is_none() && node.state.held() == Some(object) {
-            let spot = node.state.free_spot(object, &self.reserved);
+            let spot = node.state.free_spot(object, &self.spoken_for(&node.agenda));
             candidates = self.view.skill_candidates(object, spot);
         }
         let declares = |candidate: &SkillCandidate| {
