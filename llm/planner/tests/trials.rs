@@ -323,3 +323,48 @@ fn equal_memories_give_equal_decisions_in_the_middle_of_a_trial() {
     });
     assert!(again > 10);
 }
+
+#[test]
+fn what_is_not_seen_is_searched_for_under_each_cover_once_and_not_under_one_that_hides_something_else() {
+    for hides in [Some(0), Some(1), None] {
+        let mut world = World::new();
+        let green = world.cube(DVec2::new(-0.2, -0.1), GREEN, None);
+        let covers: Vec<ObjectId> = (0..3).map(|n| world.cover(DVec2::new(0.2 * f64::from(n), -0.1))).collect();
+        // The one on the left stands over the green cube, and memory knows it.
+        let known = world.cover(world.spot(green));
+        let red = world.cube(DVec2::new(0.5, 0.5), RED, None);
+        let hidden = world.objects.pop().unwrap();
+        let at = hides.map(|n: usize| world.spot(covers[n]));
+        let references = vec![colored("red", RED)];
+        let hold = Goal::Holding { object: 0, held: true };
+        let mut lifted: Vec<ObjectId> = Vec::new();
+        let end = run(&mut world, &task(references, vec![hold]), &abstain(), |world, _| {
+            if let Some(held) = world.objects.iter().find(|e| e.presence == acm_memory::entry::Presence::Held)
+                && !lifted.contains(&held.id)
+            {
+                lifted.push(held.id);
+            }
+            if let (Some(hides), Some(at)) = (hides, at)
+                && lifted.contains(&covers[hides])
+                && world.objects.iter().all(|entry| entry.id != red)
+            {
+                let mut shown = hidden.clone();
+                shown.parts[0].pose.pose.translation = at.extend(world::TABLE_Z);
+                world.objects.push(shown);
+            }
+        });
+        assert!(!lifted.contains(&known), "memory knows what is under it");
+        match hides {
+            Some(hides) => {
+                assert!(matches!(end, Decision::Done { .. }), "{end:?}");
+                assert_eq!(lifted, covers[..=hides].iter().copied().chain([red]).collect::<Vec<_>>());
+            }
+            None => {
+                let (cause, text) = given_up(&end);
+                assert_eq!(cause, GiveUpCause::Perception);
+                assert!(text.contains("I looked in or under O2, O3, O4"), "{text}");
+                assert_eq!(lifted, covers);
+            }
+        }
+    }
+}

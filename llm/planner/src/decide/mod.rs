@@ -4,6 +4,7 @@
 //! transitions, [`goals`] takes goals and groups one by one, [`trial`] finds by trying what nobody said.
 
 mod goals;
+mod search_for;
 mod trial;
 mod tries;
 
@@ -54,7 +55,7 @@ pub(crate) fn decide(
         options,
         current,
     };
-    mind.decide(subtask).unwrap_or_else(|stuck| mind.look_or_give_up(stuck))
+    mind.decide(subtask).unwrap_or_else(|stuck| mind.look_or_give_up(subtask, stuck))
 }
 
 struct Mind<'a> {
@@ -101,10 +102,19 @@ impl Mind<'_> {
         }
     }
 
-    fn look_or_give_up(&self, stuck: Stuck) -> Decision {
+    /// What is not seen is looked for again, then behind what may hide it; what is left is said.
+    fn look_or_give_up(&self, subtask: &Subtask, stuck: Stuck) -> Decision {
         if stuck.look && self.situation.looks < MAX_LOOKS {
             return self.look(stuck.unknown.text);
         }
+        let stuck = if stuck.absent {
+            match self.search_for(subtask, stuck) {
+                Ok(decision) => return decision,
+                Err(stuck) => stuck,
+            }
+        } else {
+            stuck
+        };
         Decision::GiveUp { unknown: stuck.unknown, grounds: self.grounds() }
     }
 
@@ -245,7 +255,7 @@ impl Mind<'_> {
 
 fn no_plan(goal: &Grounded, found: &Found, last_failure: Option<Unknown>) -> Stuck {
     if let Some(unknown) = last_failure {
-        return Stuck { look: false, unknown };
+        return Stuck { look: false, absent: false, unknown };
     }
     let wanted = goal.literals.iter().find(|(_, belief)| belief.truth != Truth::Yes).or(goal.literals.first());
     let literal = wanted.map_or_else(|| "nothing".to_owned(), |(literal, _)| literal.to_string());

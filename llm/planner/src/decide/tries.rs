@@ -91,7 +91,7 @@ impl Mind<'_> {
 }
 
 /// Whether a transition brought about what it should: verified, or not decidable by sight but felt.
-fn took_effect(transition: &Transition) -> bool {
+pub(super) fn took_effect(transition: &Transition) -> bool {
     match &transition.result {
         TransitionResult::Verified => true,
         TransitionResult::CannotTell | TransitionResult::Pending => {

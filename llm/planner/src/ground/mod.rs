@@ -37,16 +37,22 @@ const MAX_DEPTH: u32 = 6;
 pub(crate) struct Stuck {
     /// Whether another look may help.
     pub look: bool,
+    /// Whether a thing is not there to be seen: something may hide it.
+    pub absent: bool,
     /// What to say if it does not.
     pub unknown: Unknown,
 }
 
 impl Stuck {
     pub fn look(cause: GiveUpCause, text: String) -> Stuck {
-        Stuck { look: true, unknown: Unknown { cause, text } }
+        Stuck { look: true, absent: false, unknown: Unknown { cause, text } }
+    }
+    /// A thing is not there to be seen.
+    pub fn absent(text: String) -> Stuck {
+        Stuck { look: true, absent: true, unknown: Unknown { cause: GiveUpCause::Perception, text } }
     }
     pub fn give_up(cause: GiveUpCause, text: String) -> Stuck {
-        Stuck { look: false, unknown: Unknown { cause, text } }
+        Stuck { look: false, absent: false, unknown: Unknown { cause, text } }
     }
 }
 
@@ -140,7 +146,7 @@ impl<'a> Grounder<'a> {
 
 /// The answer where an object's whereabouts are unknown.
 pub(crate) fn missing(id: ObjectId, phrase: &str) -> Stuck {
-    Stuck::look(GiveUpCause::Perception, format!("I do not know where {phrase} ({id}) is"))
+    Stuck::absent(format!("I do not know where {phrase} ({id}) is"))
 }
 
 /// Whether some part of an object has a function that declares this effect.

@@ -254,7 +254,7 @@ impl<'a> Grounder<'a> {
             1 => format!("I see no {}: the one object I know does not fit", bare(&reference.phrase)),
             _ => format!("I see no {}: none of {considered} objects fits", bare(&reference.phrase)),
         };
-        Stuck::look(GiveUpCause::Perception, text)
+        Stuck::absent(text)
     }
 }
 

@@ -23,7 +23,7 @@ const CONTAINS: &str = "contains";
 /// Covers that are considered for one thing, the nearest first.
 const MAX_COVERS: usize = 4;
 
-pub(super) fn is_cover(entry: &ObjectEntry) -> bool {
+pub(crate) fn is_cover(entry: &ObjectEntry) -> bool {
     affords(entry, COVERING)
 }
 

@@ -15,7 +15,7 @@ use acm_concept::{
 use acm_memory::{MemoryView, query::SkillCandidate};
 use state::State;
 
-pub(crate) use derived::brings_about;
+pub(crate) use derived::{brings_about, is_cover};
 pub(crate) use state::same_atom;
 use std::{
     cmp::Ordering,
@@ -44,6 +44,8 @@ pub(crate) enum Want {
     Holds(Literal),
     /// The function is performed on the object, whatever holds already.
     Perform { function: String, object: ObjectId },
+    /// The object stands on some free spot, elsewhere than now.
+    Away(ObjectId),
 }
 
 /// What a search has to know besides memory.
@@ -113,6 +115,13 @@ pub(crate) fn believed(view: &dyn MemoryView, literal: &Literal) -> Belief {
     State::now(view).belief(literal)
 }
 
+/// What a cover is believed to stand over.
+pub(crate) fn covered_by(view: &dyn MemoryView, cover: ObjectId) -> Vec<ObjectId> {
+    let state = State::now(view);
+    let others = view.objects().iter().filter(|entry| entry.id != cover && !is_cover(entry));
+    others.map(|entry| entry.id).filter(|id| state.covering(*id).contains(&cover)).collect()
+}
+
 /// Looks for the cheapest plan that reaches all wants.
 pub(crate) fn search(view: &dyn MemoryView, wants: &[Want], limits: &Limits) -> Found {
     let reserved = wants.iter().filter_map(|want| match want {
@@ -133,6 +142,7 @@ pub(crate) fn search(view: &dyn MemoryView, wants: &[Want], limits: &Limits) -> 
     let agenda = wants.iter().rev().map(|want| match want {
         Want::Holds(literal) => Item::Achieve(Condition::Literal(literal.clone())),
         Want::Perform { function, object } => Item::Perform { function: function.clone(), object: *object },
+        Want::Away(object) => Item::PutAside(*object),
     });
     search.push(Node {
         cost: 0.0,
@@ -147,7 +157,7 @@ pub(crate) fn search(view: &dyn MemoryView, wants: &[Want], limits: &Limits) -> 
         if let Some(solved) = search.expand(node) {
             let holds = |want: &Want| match want {
                 Want::Holds(literal) => solved.state.belief(literal).truth == Truth::Yes,
-                Want::Perform { .. } => true,
+                Want::Perform { .. } | Want::Away(_) => true,
             };
             if wants.iter().all(holds) && !solved.steps.is_empty() {
                 search.found.assumed = search.undecided(&solved);
