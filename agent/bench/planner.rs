@@ -2,9 +2,15 @@
 //!
 //! | module | measures |
 //! |---|---|
+//! | [`drawn`] | how long plans for thirty objects and forty steps take |
 //! | [`goals`] | goals of tabletop tasks and household activities that are reached, each plan simulated |
+//!
+//! [`published`] makes problems of published tasks; [`simulator`] follows plans.
 
+pub mod drawn;
 pub mod goals;
+pub mod published;
+pub mod simulator;
 
 use super::BenchResult;
 use crate::cli::PlannerArgs;
@@ -15,6 +21,8 @@ use clap::ValueEnum;
 pub enum PlannerPart {
     /// Goals of tabletop tasks and of household activities, given with what holds at first.
     Goals,
+    /// Households of thirty objects that need forty steps, drawn at random.
+    Drawn,
 }
 
 /// Measures the parts that are asked for, or everything.
@@ -27,6 +35,7 @@ pub fn measure(args: &PlannerArgs) -> anyhow::Result<BenchResult> {
     for part in parts {
         let measured = match part {
             PlannerPart::Goals => goals::measure(&args.common, &mut result),
+            PlannerPart::Drawn => drawn::measure(&args.common, &mut result),
         };
         // What the other parts have measured is not lost with it.
         if let Err(error) = measured {
