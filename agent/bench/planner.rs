@@ -3,6 +3,7 @@
 //! | module | measures |
 //! |---|---|
 //! | [`drawn`] | how long plans for thirty objects and forty steps take |
+//! | [`verdicts`] | what the verifier says of finished skills, beside what came of them in truth |
 //! | [`goals`] | goals of tabletop tasks and household activities that are reached, each plan simulated |
 //!
 //! [`published`] makes problems of published tasks; [`simulator`] follows plans.
@@ -11,6 +12,7 @@ pub mod drawn;
 pub mod goals;
 pub mod published;
 pub mod simulator;
+pub mod verdicts;
 
 use super::BenchResult;
 use crate::cli::PlannerArgs;
@@ -23,6 +25,8 @@ pub enum PlannerPart {
     Goals,
     /// Households of thirty objects that need forty steps, drawn at random.
     Drawn,
+    /// What the verifier says of the skills of whole episodes, with and without things that slip.
+    Verdicts,
 }
 
 /// Measures the parts that are asked for, or everything.
@@ -36,6 +40,7 @@ pub fn measure(args: &PlannerArgs) -> anyhow::Result<BenchResult> {
         let measured = match part {
             PlannerPart::Goals => goals::measure(&args.common, &mut result),
             PlannerPart::Drawn => drawn::measure(&args.common, &mut result),
+            PlannerPart::Verdicts => verdicts::measure(&args.common, &mut result),
         };
         // What the other parts have measured is not lost with it.
         if let Err(error) = measured {
