@@ -5,11 +5,13 @@
 //! | [`targets`] | floors and goals, and the comparison with them |
 //! | [`bddl`] | reads household activities and tabletop tasks of the outside data |
 //! | [`perception`] | real labelled frames, and the fixed rendered suite with its truth |
+//! | [`identity`] | twins in a row and household rooms seen twice |
 //! | [`planner`] | goals of published tasks, plans checked by a simulator of their own |
 //! | [`runtime`] | frames and messages from one to the other, the trace, restarts |
 //! | [`world`] | physics and pictures beside MuJoCo, grasps and primitives, pace, audit, snapshots |
 
 pub mod bddl;
+pub mod identity;
 pub mod perception;
 pub mod planner;
 pub mod runtime;
@@ -145,6 +147,7 @@ impl BenchResult {
 /// Runs `acm bench`. It ends with 1 if a figure misses its floor or a part could not be measured.
 pub fn run(command: &BenchCommand) -> anyhow::Result<Exit> {
     let (BenchCommand::Perception(PerceptionArgs { common: args, .. })
+    | BenchCommand::Identity(args)
     | BenchCommand::Planner(PlannerArgs { common: args, .. })
     | BenchCommand::Runtime(args)
     | BenchCommand::World(WorldArgs { common: args, .. })) = command;
@@ -155,6 +158,7 @@ pub fn run(command: &BenchCommand) -> anyhow::Result<Exit> {
     };
     let result = match command {
         BenchCommand::Perception(args) => perception::measure(args, &targets),
+        BenchCommand::Identity(args) => identity::measure(args),
         BenchCommand::Planner(args) => planner::measure(args),
         BenchCommand::Runtime(args) => runtime::measure(args),
         BenchCommand::World(args) => world::measure(args),

@@ -395,6 +395,9 @@ pub fn exit_of_error(error: &anyhow::Error) -> Exit {
 pub enum BenchCommand {
     /// Real labelled frames and foreign meshes (found through the variable ACM_DATA), and rendered tables with their truth.
     Perception(PerceptionArgs),
+    /// Who is who when a scene is seen again: identical things in a row, and household rooms (found through the variable
+    /// ACM_DATA), beside the paper's rule.
+    Identity(BenchArgs),
     /// Goals of published tasks (found through the variable ACM_DATA): solved or not, each plan simulated.
     Planner(PlannerArgs),
     /// Frames between processes, messages between actors, what a trace costs, how fast an actor is replaced.

@@ -22,6 +22,21 @@ pub fn find(name: &str) -> Result<PathBuf, String> {
         .ok_or_else(|| format!("no data: the variable ACM_DATA names no folder that holds {name}"))
 }
 
+/// The text of a `.xz` file.
+///
+/// # Errors
+/// The file cannot be read, is larger than is unpacked, or holds something other than text.
+pub fn text(file: &Path) -> anyhow::Result<String> {
+    let unread = || format!("{} cannot be read as compressed text", file.display());
+    let unpacked = XzReader::new(BufReader::new(File::open(file).with_context(unread)?), false);
+    let mut text = String::new();
+    unpacked.take(MAX_UNPACKED).read_to_string(&mut text).with_context(unread)?;
+    if text.len() as u64 == MAX_UNPACKED {
+        bail!("{} holds more than {MAX_UNPACKED} bytes", file.display());
+    }
+    Ok(text)
+}
+
 /// The texts of a `.tar.xz` archive whose names end in `ending`, by their names.
 ///
 /// # Errors
