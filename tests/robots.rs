@@ -78,7 +78,8 @@ impl Trial {
         let solid = Solid::Box { size: DVec3::splat(CUBE_M) };
         invocation.held_solids = vec![PlacedSolid { solid, pose: Pose::from_translation(DVec3::Z * 0.5 * CUBE_M) }];
         invocation.obstacles.retain(|(id, _)| *id != held.0);
-        invocation.destination = Some(Place { support: None, pose: to, tolerance_m: 0.02 });
+        invocation.destination =
+            Some(Place { support: None, pose: to, tolerance_m: 0.02, heading_tolerance_rad: None });
         invocation.held = Some((held.0, held.1, part(to)));
         invocation.support_height_m = to.translation.z;
         self.run(&invocation)

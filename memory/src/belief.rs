@@ -2,7 +2,7 @@
 
 use crate::{
     entry::{ObjectEntry, Presence},
-    geometry::Body,
+    geometry::{Body, symmetry},
     hand::HandFeeling,
     moves::first_departure,
     scene,
@@ -133,8 +133,8 @@ impl Reader<'_> {
         let distance = offset.truncate().length();
         let sigma = (0.5 * (pose.position_sigma_m.x.powi(2) + pose.position_sigma_m.y.powi(2))).sqrt();
         let level = offset.z.abs() <= HEIGHT_M + pose.position_sigma_m.z;
-        let within = if level { probability_within(distance, sigma, place.tolerance_m) } else { 0.0 };
-        let reason = format!(
+        let mut within = if level { probability_within(distance, sigma, place.tolerance_m) } else { 0.0 };
+        let mut reason = format!(
             "{} is {:.0} mm from there ({:.0} mm allowed, {:.0} mm uncertain){}",
             entry.id,
             distance * 1e3,
@@ -142,6 +142,13 @@ impl Reader<'_> {
             sigma * 1e3,
             if level { "" } else { ", at another height" }
         );
+        if let (Some(allowed), Some(part)) = (place.heading_tolerance_rad, entry.parts.first()) {
+            let heading = pose.pose.yaw();
+            let wanted = symmetry(part, self.library).nearest(place.pose.yaw(), heading);
+            let turn = heading - wanted;
+            within *= probability_between(-allowed, allowed, turn, pose.yaw_sigma_rad);
+            reason += &format!(", turned by {:.0} deg ({:.0} allowed)", turn.to_degrees(), allowed.to_degrees());
+        }
         if within >= DECIDED {
             say(Truth::Yes, within * entry.confidence, seen(entry), reason)
         } else if within <= 1.0 - DECIDED {
@@ -304,8 +311,31 @@ impl Reader<'_> {
                 let truth = if known.negated { Truth::No } else { Truth::Yes };
                 say(truth, entry.confidence, seen(entry), format!("remembered of {}", entry.id))
             }
-            None => no_rule(literal),
+            None => self.brought_about(literal).unwrap_or_else(|| no_rule(literal)),
         }
+    }
+
+    /// What an own action of this episode was found to have brought about or undone stays so until another one is; what
+    /// an action should have done since, and nobody could tell, is unknown.
+    fn brought_about(&self, literal: &Literal) -> Option<Belief> {
+        let same = |known: &&Literal| known.predicate == literal.predicate && known.arguments == literal.arguments;
+        let own = self.state.transitions.iter().rev().filter(|t| t.moment.episode == self.state.next.episode);
+        own.into_iter().find_map(|transition| {
+            let evidence = vec![Evidence::Transition(transition.id)];
+            if let Some(found) = transition.after.iter().find(same) {
+                let truth = if found.negated { Truth::No } else { Truth::Yes };
+                return Some(say(truth, 0.9, evidence, format!("{found} was found after {}", transition.id)));
+            }
+            let felt = transition.report.felt.iter().rev().find(|(felt, _)| same(&felt));
+            if let Some((felt, confidence)) = felt {
+                let truth = if felt.negated { Truth::No } else { Truth::Yes };
+                return Some(say(truth, *confidence, evidence, format!("{felt} was felt in {}", transition.id)));
+            }
+            transition.predicted.iter().find(same).map(|predicted| {
+                let reason = format!("{} should have brought about {predicted}, and I could not tell", transition.id);
+                Belief { evidence, ..Belief::unknown(reason) }
+            })
+        })
     }
 }
 
@@ -324,6 +354,12 @@ fn probability_within(distance: f64, sigma: f64, radius: f64) -> f64 {
         within(x - 0.5 * width - distance, x + 0.5 * width - distance) * within(-half, half)
     };
     (0..STRIPS).map(strip).sum::<f64>().clamp(0.0, 1.0)
+}
+
+/// Probability that a number spread by a Gaussian about `mean` lies between two bounds.
+fn probability_between(low: f64, high: f64, mean: f64, sigma: f64) -> f64 {
+    let scale = sigma.max(1e-5) * std::f64::consts::SQRT_2;
+    (0.5 * (erf((high - mean) / scale) - erf((low - mean) / scale))).clamp(0.0, 1.0)
 }
 
 /// The error function (Abramowitz and Stegun 7.1.26), absolute error below 1.5e-7.

@@ -102,7 +102,14 @@ impl ObjectEntry {
     /// The current place: pose and support; `None` while held or missing.
     pub fn place(&self) -> Option<Place> {
         (self.presence == Presence::Present)
-            .then(|| self.pose().map(|pose| Place { support: self.support, pose, tolerance_m: 0.03 }))
+            .then(|| {
+                self.pose().map(|pose| Place {
+                    support: self.support,
+                    pose,
+                    tolerance_m: 0.03,
+                    heading_tolerance_rad: None,
+                })
+            })
             .flatten()
     }
     /// Id of the main part.

@@ -238,7 +238,7 @@ pub fn free_places(state: &State, library: &TemplateLibrary, entry: &ObjectEntry
         }
         let rotation = entry.pose().map(|pose| pose.rotation).unwrap_or_default();
         let pose = Pose::new(DVec3::new(body.centre.x, body.centre.y, body.top_m), rotation);
-        let place = Place { support: Some(other.id), pose, tolerance_m: TOLERANCE_M };
+        let place = Place { support: Some(other.id), pose, tolerance_m: TOLERANCE_M, heading_tolerance_rad: None };
         kinds.entry(part.template.as_str()).or_default().push(place);
     }
     // The first of equally common kinds, in the order of the objects' ids and not of the kinds' names.

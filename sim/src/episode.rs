@@ -161,6 +161,12 @@ impl Simulation {
         self.world().truth()
     }
 
+    /// Tells the truth at any moment of an episode, to whoever follows one. For judging; never for the agent.
+    pub fn witness(&self) -> impl Fn() -> Vec<TrueObject> + Send + Sync + 'static {
+        let shared = self.shared.clone();
+        move || lock(&shared).truth()
+    }
+
     /// What each object is made of, for people: its name, and lines about its links and joints.
     pub fn inventory(&self) -> Vec<(String, Vec<String>)> {
         let world = self.world();

@@ -154,7 +154,7 @@ fn pick(cube: &TrueObject) -> SkillInvocation {
 fn place(held: Pose, there: Pose) -> SkillInvocation {
     let arguments = [("grip_width", EDGE_M), ("height", EDGE_M)];
     SkillInvocation {
-        destination: Some(Place { support: None, pose: there, tolerance_m: 0.02 }),
+        destination: Some(Place { support: None, pose: there, tolerance_m: 0.02, heading_tolerance_rad: None }),
         held: Some((ObjectId(1), held, part(there))),
         ..invocation("place-upright", there, 0.0, &arguments)
     }

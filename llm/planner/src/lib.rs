@@ -12,11 +12,13 @@
 //! | [`task`] | goals over references |
 //! | `ground` | references to objects and places, against memory |
 //! | `search` | means-ends search over the skills that memory offers |
-//! | `decide` | the order of questions before each step; limits |
+//! | `decide` | the order of questions before each step; groups one by one, trials, searches; limits |
+//! | [`classical`] | planning over operators that are data: goals with quantifiers, heuristic search, plans that are checked |
 //! | [`bind`] | a step with perceived geometry, ready for a controller |
 //! | [`decision`], [`explanation`] | the answers and their reasons |
 
 pub mod bind;
+pub mod classical;
 mod decide;
 pub mod decision;
 pub mod explanation;
@@ -35,4 +37,4 @@ pub use hybrid::TaskPrompt;
 pub use language::ParseError;
 pub use lexicon::{Lexicon, LexiconError};
 pub use planner::{Planner, embedded_lexicon};
-pub use task::{Destination, Goal, ObjectReference, Span, Subtask, Task};
+pub use task::{Condition, Destination, Goal, ObjectReference, Span, Subtask, Task, Times};

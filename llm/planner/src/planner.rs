@@ -28,12 +28,12 @@ pub fn embedded_lexicon() -> BTreeMap<String, String> {
 /// progress too, and the same memory always gives the same decision.
 ///
 /// ```
-/// # use acm_planner::{Planner, Goal};
+/// # use acm_planner::{Planner, Goal, Times};
 /// # use acm_concept::template::TemplateLibrary;
 /// # let button = include_str!("../../../memory/library/button.toml");
 /// let library = TemplateLibrary::parse([("button.toml", button)]).unwrap();
 /// let task = Planner::new().unwrap().parse("Press the button twice.", &library).unwrap();
-/// assert!(matches!(task.subtasks[0].goal, Goal::Performed { times: 2, .. }));
+/// assert!(matches!(task.subtasks[0].goal, Goal::Performed { times: Times::Count(2), .. }));
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Planner {

@@ -1,12 +1,13 @@
 //! What an instruction asks for: goals over references that are resolved when their subtask is due.
 
+mod words;
+
 use acm_concept::{color::Lab, template::TemplateLibrary};
 use acm_memory::query::PlaceReference;
 use serde::{Deserialize, Serialize};
-use std::fmt;
 
 /// Bytes `start..end` of the instruction.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Span {
     /// First byte.
     pub start: usize,
@@ -39,6 +40,30 @@ pub struct Task {
     pub untouched: Vec<ReferenceIndex>,
     /// The library's nouns that the instruction uses, for the prior of perception.
     pub nouns: Vec<String>,
+    /// What the instruction says of the way of doing it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub manners: Vec<Manner>,
+}
+
+/// What an instruction says of the way of doing it: it asks for no goal of its own.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Manner {
+    /// Where the words stand in the instruction.
+    pub span: Span,
+    /// What they say.
+    pub kind: MannerKind,
+}
+
+/// Kinds of [`Manner`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum MannerKind {
+    /// One thing after the other ("one cube at a time"): a hand that holds one thing does so anyway.
+    OneAtATime,
+    /// Never two things in one place: no plan puts a thing where another one stands.
+    OneToAPlace,
+    /// A place for what has to be put aside ("using the spare tray").
+    Aside(ReferenceIndex),
 }
 
 /// Index into [`Task::references`]. Two phrases that mean the same thing have the same index.
@@ -53,6 +78,60 @@ pub struct Subtask {
     pub span: Span,
     /// What shall be so.
     pub goal: Goal,
+    /// What must hold for the subtask to be done; where it does not, nothing is done ("if the drawer is open, close it").
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub when: Option<Condition>,
+}
+
+/// A statement about things that is so or is not: `predicate(arguments)`.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Condition {
+    /// A predicate of [literals](https://docs.rs/acm-concept): `open`, `on`, `visible`.
+    pub predicate: String,
+    /// What it is said of.
+    pub arguments: Vec<ReferenceIndex>,
+    /// Whether it must not hold.
+    pub negated: bool,
+    /// The subtask at whose beginning it is judged, where that is not the moment at which it is asked: what depends on
+    /// one "if" is judged once, and so is its "otherwise".
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub judged_at: Option<u32>,
+}
+
+/// How often something is done.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Times {
+    /// A number that the instruction names.
+    Count(u32),
+    /// The number that a thing shows ("as often as the card says").
+    Shown(ReferenceIndex),
+    /// Again and again until something holds ("until the lid is open").
+    Until(Condition),
+}
+
+/// In which order the members of a group are taken.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Ordering {
+    /// Any.
+    Any,
+    /// Beginning at a side ("from left to right").
+    From(Direction),
+    /// One after the other as named: each is a description of one member ("red, green and blue in that order").
+    Named(Vec<ReferenceIndex>),
+}
+
+/// What is varied from try to try, where the instruction does not say which one is right.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Variation {
+    /// Which member of the group stands where: the places are those on which they stand at the start.
+    Order,
+    /// Which way round each member lies, by half a turn about the vertical.
+    Heading,
+    /// Which member it is.
+    Choice,
 }
 
 /// What a subtask brings about.
@@ -80,20 +159,91 @@ pub enum Goal {
         /// What it is performed on.
         object: ReferenceIndex,
         /// How often.
-        times: u32,
+        times: Times,
+    },
+    /// A predicate holds of the object, or does not: `open`, `switched-on`, `sliced`.
+    State {
+        /// The predicate.
+        predicate: String,
+        /// What it is said of.
+        object: ReferenceIndex,
+        /// Whether it shall be so.
+        holds: bool,
+    },
+    /// The goals of the body, one after the other, for each member of a group, one member at a time. In the body the
+    /// group's index means the member whose turn it is.
+    Each {
+        /// The group.
+        members: ReferenceIndex,
+        /// Who comes first.
+        order: Ordering,
+        /// What is done with each.
+        body: Vec<Goal>,
+    },
+    /// Something about a group is varied until a sign shows, or, where no sign can be seen, until all has been tried.
+    Find {
+        /// What is varied.
+        members: ReferenceIndex,
+        /// How.
+        vary: Variation,
+        /// Where the members must be for a try to count ("in the holder"), if anywhere.
+        within: Option<Destination>,
+        /// What is done to try what stands there ("press after each new arrangement"), if anything.
+        probe: Option<Box<Goal>>,
+        /// What shows that it is right, if anything does.
+        sign: Option<Condition>,
+    },
+    /// Nothing is done before the condition holds.
+    Await {
+        /// The condition.
+        condition: Condition,
     },
 }
 
 impl Goal {
-    /// The object that the goal is about.
-    pub fn object(&self) -> ReferenceIndex {
+    /// The object that the goal is about; `None` where it is about nothing that is acted on.
+    pub fn object(&self) -> Option<ReferenceIndex> {
         match self {
-            Goal::At { object, .. } | Goal::Holding { object, .. } | Goal::Performed { object, .. } => *object,
+            Goal::At { object, .. }
+            | Goal::Holding { object, .. }
+            | Goal::Performed { object, .. }
+            | Goal::State { object, .. } => Some(*object),
+            Goal::Each { members, .. } | Goal::Find { members, .. } => Some(*members),
+            Goal::Await { .. } => None,
         }
+    }
+    /// All things that the goal names, without those that only describe them.
+    pub fn references(&self) -> Vec<ReferenceIndex> {
+        let mut named: Vec<ReferenceIndex> = self.object().into_iter().collect();
+        let condition = |condition: &Option<Condition>| condition.iter().flat_map(|c| c.arguments.clone()).collect();
+        let more: Vec<ReferenceIndex> = match self {
+            Goal::At { destination, .. } => destination.references(),
+            Goal::Performed { times: Times::Shown(by), .. } => vec![*by],
+            Goal::Performed { times: Times::Until(until), .. } => until.arguments.clone(),
+            Goal::Holding { .. } | Goal::Performed { .. } | Goal::State { .. } => Vec::new(),
+            Goal::Each { order, body, .. } => {
+                let named = if let Ordering::Named(named) = order { named.clone() } else { Vec::new() };
+                named.into_iter().chain(body.iter().flat_map(Goal::references)).collect()
+            }
+            Goal::Find { within, probe, sign, .. } => {
+                let mut more: Vec<ReferenceIndex> = condition(sign);
+                more.extend(within.iter().flat_map(Destination::references));
+                more.extend(probe.iter().flat_map(|probe| probe.references()));
+                more
+            }
+            Goal::Await { condition } => condition.arguments.clone(),
+        };
+        named.extend(more);
+        named
     }
     /// Whether reaching the goal may move its object.
     pub fn moves(&self) -> bool {
-        matches!(self, Goal::At { .. } | Goal::Holding { .. })
+        match self {
+            Goal::At { .. } | Goal::Holding { .. } => true,
+            Goal::Each { body, .. } => body.iter().any(Goal::moves),
+            Goal::Find { vary, .. } => matches!(vary, Variation::Order | Variation::Heading),
+            Goal::Performed { .. } | Goal::State { .. } | Goal::Await { .. } => false,
+        }
     }
 }
 
@@ -103,6 +253,16 @@ impl Goal {
 pub enum Destination {
     /// On top of a thing, at its centre.
     On {
+        /// The thing.
+        reference: ReferenceIndex,
+    },
+    /// Inside a thing that contains: a box, a drawer, a basket.
+    In {
+        /// The thing.
+        reference: ReferenceIndex,
+    },
+    /// Below a thing, covered by it or under its top.
+    Under {
         /// The thing.
         reference: ReferenceIndex,
     },
@@ -131,6 +291,8 @@ pub enum Destination {
         with: ReferenceIndex,
         /// Whether this is the first of the two.
         first: bool,
+        /// Whether it also takes over the other's heading.
+        heading: bool,
     },
     /// Where an object was.
     History {
@@ -139,6 +301,22 @@ pub enum Destination {
         /// Which of its places.
         reference: PlaceReference,
     },
+}
+
+impl Destination {
+    /// The things that it names.
+    pub fn references(&self) -> Vec<ReferenceIndex> {
+        match self {
+            Destination::On { reference }
+            | Destination::In { reference }
+            | Destination::Under { reference }
+            | Destination::Beside { reference, .. } => vec![*reference],
+            Destination::Middle { of } => of.iter().copied().collect(),
+            Destination::Between { first, second } => vec![*first, *second],
+            Destination::Exchanged { with, .. } => vec![*with],
+            Destination::History { object, .. } => vec![*object],
+        }
+    }
 }
 
 /// A direction as seen by somebody who stands behind the robot's base: world x points right, world y away.
@@ -153,30 +331,39 @@ pub enum Direction {
     Front,
     /// Far, towards positive y.
     Back,
+    /// High: towards positive z.
+    Up,
+    /// Low: towards negative z.
+    Down,
 }
 
 impl Direction {
-    /// The unit vector in the world's x-y plane.
-    pub fn vector(self) -> glam::DVec2 {
+    /// The unit vector in the world.
+    pub fn vector(self) -> glam::DVec3 {
         match self {
-            Direction::Left => glam::DVec2::NEG_X,
-            Direction::Right => glam::DVec2::X,
-            Direction::Front => glam::DVec2::NEG_Y,
-            Direction::Back => glam::DVec2::Y,
+            Direction::Left => glam::DVec3::NEG_X,
+            Direction::Right => glam::DVec3::X,
+            Direction::Front => glam::DVec3::NEG_Y,
+            Direction::Back => glam::DVec3::Y,
+            Direction::Up => glam::DVec3::Z,
+            Direction::Down => glam::DVec3::NEG_Z,
         }
     }
 }
 
 /// How many things a phrase means.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Quantity {
     /// The one that fits: more than one is ambiguous.
+    #[default]
     TheOne,
     /// Any one that fits.
     AnyOne,
     /// All that fit, as a group.
     Group,
+    /// So many of those that fit, whichever.
+    Count(u32),
 }
 
 /// A choice by size.
@@ -212,7 +399,7 @@ pub enum Rank {
 
 /// A description of a thing. Positions in it ("left", "on the mat") are meant as they were when the subtask
 /// `subtask` began, so that a description stays true of what was moved because of it.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct ObjectReference {
     /// The words.
     pub phrase: String,
@@ -240,70 +427,39 @@ pub struct ObjectReference {
     pub located: Option<Box<Destination>>,
     /// Not these ("the other cube").
     pub other_than: Vec<ReferenceIndex>,
+    /// What it is a part of ("the top drawer of the cabinet"): it is described among the parts of this thing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub part_of: Option<ReferenceIndex>,
+    /// What it looks like in shape and colour ("its twin"), without being it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub twin_of: Option<ReferenceIndex>,
+    /// What stands on it or lies in it ("the mat with the cube on it").
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub contains: Vec<ReferenceIndex>,
+    /// States that it must be in when it is due, and whether they must hold ("the open drawer", "a sliced apple").
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub states: Vec<(String, bool)>,
+    /// Which one by what was done with it in this episode ("the one you took first").
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub handled: Option<Handled>,
 }
 
-impl Task {
-    /// The goals alone, one a line, with things numbered in the order in which they are named. Two instructions
-    /// that ask for the same have the same outline, whatever nouns and colours they use.
-    pub fn outline(&self) -> Vec<String> {
-        let mut order: Vec<ReferenceIndex> = Vec::new();
-        let mut number = |index: ReferenceIndex| match order.iter().position(|&known| known == index) {
-            Some(place) => format!("#{place}"),
-            None => {
-                order.push(index);
-                format!("#{}", order.len() - 1)
-            }
-        };
-        let mut lines = Vec::with_capacity(self.subtasks.len());
-        for subtask in &self.subtasks {
-            lines.push(match &subtask.goal {
-                Goal::At { object, destination } => {
-                    let object = number(*object);
-                    let to = match destination {
-                        Destination::On { reference } => format!("on {}", number(*reference)),
-                        Destination::Middle { .. } => "middle".into(),
-                        Destination::Between { first, second } => {
-                            format!("between {} and {}", number(*first), number(*second))
-                        }
-                        Destination::Beside { reference, side } => format!("beside {} {side:?}", number(*reference)),
-                        Destination::Exchanged { with, .. } => format!("in place of {}", number(*with)),
-                        Destination::History { object, reference } => format!("{reference:?} of {}", number(*object)),
-                    };
-                    format!("at({object}, {to})")
-                }
-                Goal::Holding { object, held: true } => format!("holding({})", number(*object)),
-                Goal::Holding { object, held: false } => format!("not holding({})", number(*object)),
-                Goal::Performed { function, object, times } => format!("{function}({}) x{times}", number(*object)),
-            });
-        }
-        lines
+impl ObjectReference {
+    /// The things that describe it.
+    pub fn references(&self) -> Vec<ReferenceIndex> {
+        let located = self.located.as_deref().map(Destination::references).unwrap_or_default();
+        let wholes = self.part_of.into_iter().chain(self.twin_of);
+        located.into_iter().chain(self.other_than.iter().copied()).chain(wholes).chain(self.contains.clone()).collect()
     }
-    /// A goal in words.
-    pub fn describe(&self, goal: &Goal) -> String {
-        let name = |index: &ReferenceIndex| {
-            self.references.get(*index).map_or_else(|| format!("reference {index}"), |r| format!("\"{}\"", r.phrase))
-        };
-        match goal {
-            Goal::At { object, destination } => match destination {
-                Destination::On { reference } => format!("{} stands on {}", name(object), name(reference)),
-                Destination::Middle { of: Some(group) } => {
-                    format!("{} stands in the middle of {}", name(object), name(group))
-                }
-                Destination::Middle { of: None } => format!("{} stands in the middle of the places", name(object)),
-                Destination::Between { first, second } => {
-                    format!("{} stands between {} and {}", name(object), name(first), name(second))
-                }
-                Destination::Beside { reference, .. } => format!("{} stands beside {}", name(object), name(reference)),
-                Destination::Exchanged { with, .. } => format!("{} stands where {} stood", name(object), name(with)),
-                Destination::History { object: of, reference } => {
-                    format!("{} stands {}", name(object), history_phrase(*reference, &name(of)))
-                }
-            },
-            Goal::Holding { object, held: true } => format!("{} is in the hand", name(object)),
-            Goal::Holding { object, held: false } => format!("{} is put down", name(object)),
-            Goal::Performed { function, object, times } => format!("{function} {} x{times}", name(object)),
-        }
-    }
+}
+
+/// A choice by what the agent did, from its own transitions.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Handled {
+    /// The predicate that the deed brought about: `holding`, `at`, `open`, `pressed`.
+    pub effect: String,
+    /// Which one in time, counted from 0; from the last one if negative (-1).
+    pub rank: i32,
 }
 
 /// "where X came from" and its like.
@@ -326,14 +482,4 @@ pub(crate) fn functions_with_effect<'a>(library: &'a TemplateLibrary, predicate:
     names.sort_unstable();
     names.dedup();
     names
-}
-
-impl fmt::Display for Task {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (index, subtask) in self.subtasks.iter().enumerate() {
-            let separator = if index == 0 { "" } else { "; " };
-            write!(f, "{separator}{}. {}", index + 1, self.describe(&subtask.goal))?;
-        }
-        Ok(())
-    }
 }

@@ -228,7 +228,7 @@ proptest! {
         let text = words.iter().map(|&word| WORDS[word]).collect::<Vec<_>>().join(" ");
         if let Ok(task) = parse(&text) {
             let known = |index: usize| index < task.references.len();
-            prop_assert!(task.subtasks.iter().all(|subtask| known(subtask.goal.object())));
+            prop_assert!(task.subtasks.iter().all(|subtask| subtask.goal.references().into_iter().all(known)));
             prop_assert!(task.subtasks.len() <= acm_planner::language::MAX_CLAUSES);
         }
     }

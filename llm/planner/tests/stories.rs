@@ -68,7 +68,12 @@ fn a_memory_wiped_after_the_first_place_gives_up_before_it_touches_anything() {
 fn a_cube_already_in_the_middle_has_no_known_origin() {
     let mut world = World::with_mats(4, 0);
     let cube = ObjectId(5);
-    let place = Place { support: None, pose: Pose::from_translation(MIDDLE.extend(world::TABLE_Z)), tolerance_m: 0.03 };
+    let place = Place {
+        support: None,
+        pose: Pose::from_translation(MIDDLE.extend(world::TABLE_Z)),
+        tolerance_m: 0.03,
+        heading_tolerance_rad: None,
+    };
     let entry = world.objects.iter_mut().find(|entry| entry.id == cube).unwrap();
     entry.parts[0].pose.pose = place.pose;
     entry.support = None;
@@ -408,6 +413,7 @@ fn a_memory_of_the_last_frame_and_action_alone_guesses_once() {
             support: Some(mat),
             pose: Pose::from_translation(world.spot(mat).extend(world::TABLE_Z + 0.001)),
             tolerance_m: 0.03,
+            heading_tolerance_rad: None,
         };
         free.map(|mat| (place(mat), 0.25)).collect::<Vec<_>>()
     };
@@ -439,8 +445,12 @@ fn a_move_that_was_only_seen_is_enough_to_return() {
     let mut world = World::with_mats(4, 0);
     let cube = ObjectId(5);
     let home = world.spot(cube);
-    let elsewhere =
-        Place { support: None, pose: Pose::from_translation(MIDDLE.extend(world::TABLE_Z)), tolerance_m: 0.03 };
+    let elsewhere = Place {
+        support: None,
+        pose: Pose::from_translation(MIDDLE.extend(world::TABLE_Z)),
+        tolerance_m: 0.03,
+        heading_tolerance_rad: None,
+    };
     let end = run(&mut world, &task("Return the cube to where it came from."), &abstain(), |_, _| {});
     assert_eq!(given_up(&end).0, GiveUpCause::Memory);
     assert!(world.done_skills.is_empty());
@@ -470,7 +480,10 @@ fn of_two_alike_the_one_that_was_moved_is_put_back() {
         let cubes = [world.cube(DVec2::new(-0.2, 0.0), RED, None), world.cube(DVec2::new(0.2, 0.0), RED, None)];
         let home = world.spot(cubes[moved]);
         let elsewhere = Pose::from_translation(DVec2::new(0.0, -0.15).extend(world::TABLE_Z));
-        world.seen_moving(cubes[moved], Place { support: None, pose: elsewhere, tolerance_m: 0.03 });
+        world.seen_moving(
+            cubes[moved],
+            Place { support: None, pose: elsewhere, tolerance_m: 0.03, heading_tolerance_rad: None },
+        );
         let end = run(&mut world, &task("Put the cube back where it was."), &abstain(), |_, _| {});
         assert!(matches!(end, Decision::Done { .. }), "{end:?}");
         assert!(world.spot(cubes[moved]).distance(home) < 1e-9, "{:?}", world.done_skills);

@@ -45,7 +45,12 @@ fn bring_to_the_middle(memory: &mut dyn Memory, start: (f64, f64)) -> ObjectId {
     memory.record(&executed).unwrap();
     look(memory, 1, 3.1, &scene(None), &[(block, Visibility::SeenThrough, 1.0)], &gripping_hand(3.1)).unwrap();
     assert_eq!(memory.view().held().map(|entry| entry.id), Some(block), "{}", memory.name());
-    let middle = Place { support: None, pose: Pose::from_translation((0.1, -0.1, 0.001).into()), tolerance_m: 0.03 };
+    let middle = Place {
+        support: None,
+        pose: Pose::from_translation((0.1, -0.1, 0.001).into()),
+        tolerance_m: 0.03,
+        heading_tolerance_rad: None,
+    };
     let candidates = memory.view().skill_candidates(block, Some(middle));
     let place = candidates.iter().find(|candidate| candidate.skill == "place").unwrap();
     let executed = report(&*memory.view(), "place", block, 6.0).unwrap().predicting(place).leaving(middle);

@@ -15,6 +15,10 @@ pub struct Place {
     pub pose: Pose,
     /// How far from the spot, seen from above, still counts as there; metres.
     pub tolerance_m: f64,
+    /// How far from the pose's heading still counts as there, radians, modulo the object's symmetry; `None` where any
+    /// heading does.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub heading_tolerance_rad: Option<f64>,
 }
 
 /// An argument of a literal.

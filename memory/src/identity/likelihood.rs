@@ -13,14 +13,16 @@ use acm_concept::{
 use glam::DVec3;
 use std::f64::consts::TAU;
 
-/// Prior probability that a percept shows something that was never registered.
-const NEW: f64 = 0.05;
 /// Share of newcomers that look like something already known: twins are common.
 const TWIN: f64 = 0.5;
-/// Volume in which an object that is "elsewhere" may be, cubic metres: a table top, 30 cm high.
-const ROOM_M3: f64 = 0.3;
+/// Smallest volume in which an object that is "elsewhere" may be, cubic metres: a table top, 30 cm high.
+const LEAST_ROOM_M3: f64 = 0.3;
+/// How far about the outermost things the room goes on, metres.
+const ROOM_MARGIN_M: f64 = 0.15;
 /// A pair that is this much worse than "new" is not considered, natural logarithm.
 const GATE: f64 = 7.0;
+/// Logarithm of how often a percept is new where nothing is known of that, for the gate.
+const RARELY_NEW: f64 = -3.0;
 /// Squared Mahalanobis distance beyond which a place does not explain a percept.
 const PLACE_GATE: f64 = 25.0;
 /// A fragment fits within a thing if it is longer by no more than this factor.
@@ -37,22 +39,26 @@ const HINT: f64 = 1.1;
 pub(crate) struct Scores {
     /// By percept: the objects (index into the predictions) within the gates, with their scores.
     pub(crate) pairs: Vec<Vec<(usize, f64)>>,
-    /// By percept: the score of being none of them.
+    /// By percept: the score of being none of them, but for how often newcomers are.
     pub(crate) new: Vec<f64>,
+    /// By object: whether the camera should see it, so that not finding it tells something.
+    pub(crate) due: Vec<bool>,
 }
 
 /// Scores all pairs and drops those beyond the gates.
 pub(crate) fn scores(percepts: &[Percept<'_>], predictions: &[Prediction], library: &TemplateLibrary) -> Scores {
-    let mut scores = Scores { pairs: Vec::with_capacity(percepts.len()), new: Vec::with_capacity(percepts.len()) };
+    let room_m3 = room_m3(percepts, predictions);
+    let due = predictions.iter().map(|prediction| prediction.due).collect();
+    let mut scores = Scores { pairs: Vec::new(), new: Vec::new(), due };
     for percept in percepts {
         let looks: Vec<f64> =
             predictions.iter().map(|known| look_ratio(Look::seen(percept), Look::known(known), library)).collect();
         let alike = looks.iter().map(|look| look.exp()).sum::<f64>() / (looks.len().max(1) as f64);
-        let new = NEW.ln() + (1.0 - TWIN + TWIN * alike).ln();
+        let new = (1.0 - TWIN + TWIN * alike).ln();
         let pair = |(index, (prediction, look)): (usize, (&Prediction, &f64))| {
             let hint = if percept.object.expected == Some(prediction.id) { HINT } else { 0.0 };
-            let score = place_ratio(percept, prediction) + look + hint;
-            (score > new - GATE).then_some((index, score))
+            let score = place_ratio(percept, prediction, room_m3) + look + hint;
+            (score > new + RARELY_NEW - GATE).then_some((index, score))
         };
         scores.pairs.push(predictions.iter().zip(&looks).enumerate().filter_map(pair).collect());
         scores.new.push(new);
@@ -60,8 +66,17 @@ pub(crate) fn scores(percepts: &[Percept<'_>], predictions: &[Prediction], libra
     scores
 }
 
+/// Volume of the room, cubic metres: the box round all that is known and seen, with some space about it.
+fn room_m3(percepts: &[Percept<'_>], predictions: &[Prediction]) -> f64 {
+    let known = predictions.iter().flat_map(|prediction| prediction.places.iter().map(|place| place.position));
+    let spots = percepts.iter().map(|percept| percept.pose.pose.translation).chain(known);
+    let (low, high) = spots.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), spot| (l.min(spot), h.max(spot)));
+    let volume = (high - low + 2.0 * ROOM_MARGIN_M).element_product();
+    if volume.is_finite() { volume.max(LEAST_ROOM_M3) } else { LEAST_ROOM_M3 }
+}
+
 /// Log ratio of the place: a mixture of where the object may be, against anywhere in the room.
-fn place_ratio(percept: &Percept<'_>, prediction: &Prediction) -> f64 {
+fn place_ratio(percept: &Percept<'_>, prediction: &Prediction, room_m3: f64) -> f64 {
     let seen = &percept.pose;
     let slack = fragment_slack_m(percept, prediction);
     let variance = seen.position_sigma_m * seen.position_sigma_m + DVec3::new(slack * slack, slack * slack, 0.0);
@@ -70,7 +85,7 @@ fn place_ratio(percept: &Percept<'_>, prediction: &Prediction) -> f64 {
         let (offset, variance) = (seen.pose.translation - place.position, variance + place.variance);
         let distance = (offset * offset / variance).element_sum();
         if distance < PLACE_GATE {
-            let peak = ROOM_M3 / (TAU.powi(3) * variance.element_product()).sqrt();
+            let peak = room_m3 / (TAU.powi(3) * variance.element_product()).sqrt();
             likelihood += place.weight * peak * (-0.5 * distance).exp();
         }
     }

@@ -21,6 +21,10 @@ pub(crate) const VIEW_SIGMA_M: DVec3 = DVec3::new(0.005, 0.005, 0.007);
 pub(crate) const HAND_SIGMA_M: f64 = 0.012;
 /// Uncertainty of a thing's place in the hand if only the hand's pose is known, metres.
 const LOOSE_GRIP_SIGMA_M: f64 = 0.06;
+/// Probability that a thing was moved between two views where its place is hidden.
+const MOVED_UNSEEN: f64 = 0.03;
+/// The same where its place is in view, but nothing says whether it is still there.
+const MOVED_UNTOLD: f64 = 0.003;
 /// How far an unlucky push may shift a thing, metres.
 const PUSHED_SIGMA_M: f64 = 0.04;
 
@@ -47,6 +51,8 @@ pub(crate) struct Prediction {
     pub(crate) places: Vec<Hypothesis>,
     /// Probability that it is anywhere else.
     pub(crate) elsewhere: f64,
+    /// Whether the camera should see it if it is where it is believed to be.
+    pub(crate) due: bool,
 }
 
 /// Predictions for all objects whose shape is known.
@@ -84,6 +90,8 @@ fn predict(
         places.push(place(0.3, part.pose.pose.translation, part.pose.position_sigma_m + VIEW_SIGMA_M));
     }
     let body = Body::of(&parts, library)?;
+    let hidden = |view: &ExpectedView| matches!(view.visibility, Visibility::Occluded | Visibility::OutOfView);
+    let due = entry.presence == Presence::Present && !view.is_some_and(hidden);
     Some(Prediction {
         id: entry.id,
         parts,
@@ -92,15 +100,17 @@ fn predict(
         body,
         places,
         elsewhere,
+        due,
     })
 }
 
 /// Probability that an object believed present is not where it is believed to be.
 fn probability_elsewhere(state: &State, entry: &ObjectEntry, track: &Track, view: Option<&ExpectedView>) -> f64 {
-    let seen = view.map_or(0.03, |view| match view.visibility {
+    let seen = view.map_or(MOVED_UNTOLD, |view| match view.visibility {
         Visibility::Seen => 0.005,
         Visibility::SeenThrough => 0.9 * view.fraction.clamp(0.1, 1.0),
-        Visibility::Occluded | Visibility::OutOfView | Visibility::NotMeasured => 0.03,
+        Visibility::NotMeasured => MOVED_UNTOLD,
+        Visibility::Occluded | Visibility::OutOfView => MOVED_UNSEEN,
     });
     let acted_on = if track.disturbed || track.unconfirmed.is_some() { 0.3 } else { 0.0 };
     let earlier_run = if entry.last_seen.episode < state.next.episode { 0.3 } else { 0.0 };

@@ -69,7 +69,12 @@ fn perform(memory: &mut AcmMemory, number: usize, step: &Step) -> Result<(), Mem
             let view = memory.view();
             let held = view.objects().iter().find(|entry| entry.presence == Presence::Held).map(|entry| entry.id);
             let Some(executed) = held.and_then(|id| report(&*view, "place", id, seconds)) else { return Ok(()) };
-            let mut place = acm_concept::literal::Place { support: None, pose: Default::default(), tolerance_m: 0.03 };
+            let mut place = acm_concept::literal::Place {
+                support: None,
+                pose: Default::default(),
+                tolerance_m: 0.03,
+                heading_tolerance_rad: None,
+            };
             place.pose.translation.x = *x;
             memory.record(&executed.leaving(place)).map(drop)
         }

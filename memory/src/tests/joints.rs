@@ -66,3 +66,26 @@ fn the_newest_way_that_went_well_tells_the_joint() {
     let second = memory.record(&swung(&memory, DVec3::new(0.21, 0.15, 0.1), 8.0)).unwrap();
     assert_eq!(evidence(&memory), second);
 }
+
+#[test]
+fn what_an_action_opened_stays_open_until_another_one_closes_it() {
+    let mut memory = seen();
+    let open = Literal::parse("open(O1)").unwrap();
+    assert_eq!(truth(&memory, "open(O1)"), Truth::Unknown);
+    let mut act = |memory: &mut AcmMemory, felt: Option<Literal>, ended_s: f64| {
+        let mut executed = report(&*memory.view(), "pick", ObjectId(1), ended_s).unwrap();
+        executed.predicted = vec![open.clone()];
+        executed.report.felt = felt.into_iter().map(|literal| (literal, 0.9)).collect();
+        memory.record(&executed).unwrap()
+    };
+    act(&mut memory, Some(open.clone()), 4.0);
+    look(&mut memory, 9, 5.0, &[chest(0.1)], &[], &open_hand(5.0)).unwrap();
+    assert_eq!(truth(&memory, "open(O1)"), Truth::Yes);
+    act(&mut memory, Some(open.negate()), 6.0);
+    assert_eq!(truth(&memory, "open(O1)"), Truth::No);
+    // A try that nobody could judge leaves the state open.
+    act(&mut memory, None, 8.0);
+    assert_eq!(truth(&memory, "open(O1)"), Truth::Unknown);
+    memory.wipe().unwrap();
+    assert_eq!(truth(&memory, "open(O1)"), Truth::Unknown);
+}

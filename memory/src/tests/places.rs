@@ -94,7 +94,12 @@ fn being_at_a_place_is_three_valued() {
     let mut memory = memory();
     look(&mut memory, 0, 0.0, &[block(0.0, 0.0).spread(0.02)], &[], &open_hand(0.0)).unwrap();
     let at = |memory: &AcmMemory, x: f64| {
-        let place = Place { support: None, pose: Pose::from_translation(DVec3::new(x, 0.0, 0.0)), tolerance_m: 0.03 };
+        let place = Place {
+            support: None,
+            pose: Pose::from_translation(DVec3::new(x, 0.0, 0.0)),
+            tolerance_m: 0.03,
+            heading_tolerance_rad: None,
+        };
         memory.view().belief(&Literal::new("at", vec![Term::Object(ObjectId(1)), Term::Place(place)])).truth
     };
     assert_eq!(at(&memory, 0.0), Truth::Unknown, "2 cm of uncertainty leave a third outside 3 cm");
@@ -103,7 +108,32 @@ fn being_at_a_place_is_three_valued() {
         look(&mut memory, frame, 1.0, &[block(0.0, 0.0)], &[], &open_hand(1.0)).unwrap();
     }
     assert_eq!(at(&memory, 0.005), Truth::Yes);
-    let high = Place { support: None, pose: Pose::from_translation(DVec3::new(0.0, 0.0, 0.1)), tolerance_m: 0.03 };
+    let high = Place {
+        support: None,
+        pose: Pose::from_translation(DVec3::new(0.0, 0.0, 0.1)),
+        tolerance_m: 0.03,
+        heading_tolerance_rad: None,
+    };
     let belief = memory.view().belief(&Literal::new("at", vec![Term::Object(ObjectId(1)), Term::Place(high)]));
     assert_eq!(belief.truth, Truth::No, "{}", belief.reason);
+}
+
+#[test]
+fn a_place_with_a_heading_is_reached_modulo_the_symmetry_of_what_stands_there() {
+    let mut memory = memory();
+    let oblong = Thing::block([0.08, 0.03, 0.04]).at(0.0, 0.0, 0.0).colored(BLUE);
+    for frame in 0..8 {
+        look(&mut memory, frame, 1.0, &[oblong], &[], &open_hand(1.0)).unwrap();
+    }
+    let pose = object(&memory, ObjectId(1)).pose().unwrap();
+    let turned_by = |turn: f64| {
+        let pose = Pose::from_yaw(pose.translation, pose.yaw() + turn);
+        let place = Place { support: None, pose, tolerance_m: 0.03, heading_tolerance_rad: Some(0.26) };
+        memory.view().belief(&Literal::new("at", vec![Term::Object(ObjectId(1)), Term::Place(place)]))
+    };
+    assert_eq!(turned_by(0.0).truth, Truth::Yes);
+    assert_eq!(turned_by(std::f64::consts::PI).truth, Truth::Yes, "half a turn of a box changes nothing");
+    let across = turned_by(std::f64::consts::FRAC_PI_2);
+    assert_eq!(across.truth, Truth::No);
+    assert!(across.reason.contains("turned by"), "{}", across.reason);
 }

@@ -83,7 +83,7 @@ fn skills_are_bound_to_parts_and_need_their_destination() {
         view.skill_candidates(ObjectId(id), to).iter().map(|c| format!("{} {}", c.skill, c.part)).collect()
     };
     assert_eq!(names(1, None), ["pick P1.0"]);
-    let to = Place { support: None, pose: Pose::IDENTITY, tolerance_m: 0.03 };
+    let to = Place { support: None, pose: Pose::IDENTITY, tolerance_m: 0.03, heading_tolerance_rad: None };
     assert_eq!(names(1, Some(to)), ["pick P1.0", "place P1.0"]);
     assert_eq!(names(6, None), ["press P6.0"]);
     assert!(names(5, Some(to)).is_empty());

@@ -34,7 +34,12 @@ fn find(view: &dyn MemoryView, noun: &str) -> ObjectId {
 }
 
 fn place_at(x: f64, y: f64) -> Place {
-    Place { support: None, pose: Pose::from_translation(DVec3::new(x, y, 0.001)), tolerance_m: 0.03 }
+    Place {
+        support: None,
+        pose: Pose::from_translation(DVec3::new(x, y, 0.001)),
+        tolerance_m: 0.03,
+        heading_tolerance_rad: None,
+    }
 }
 
 /// The look after a skill: when it ended, the frame's number, where the block is seen.

@@ -68,7 +68,7 @@ fn pick(size: DVec3, base: Pose) -> SkillInvocation {
 /// A place of what is held with its base there.
 fn place(held: Pose, base: Pose) -> SkillInvocation {
     let mut invocation = invocation("place-upright", base, 0.0, &[("grip_width", 0.04), ("height", 0.04)]);
-    invocation.destination = Some(Place { support: None, pose: base, tolerance_m: 0.02 });
+    invocation.destination = Some(Place { support: None, pose: base, tolerance_m: 0.02, heading_tolerance_rad: None });
     invocation.held = Some((ObjectId(1), held, part(base)));
     invocation
 }

@@ -173,7 +173,7 @@ pub fn invocation(kind: &str, object: ObjectId, base: Pose, frame: Pose, argumen
 
 /// A place for the base of what is held.
 pub fn place(pose: Pose) -> Option<Place> {
-    Some(Place { support: None, pose, tolerance_m: 0.01 })
+    Some(Place { support: None, pose, tolerance_m: 0.01, heading_tolerance_rad: None })
 }
 
 /// A part of which nothing but the pose is known.

@@ -27,7 +27,7 @@ const MOVED_M: f64 = 0.02;
 const FIRST_ANGLE_RAD: f64 = 1.0;
 
 /// Where an object was at a moment (now, for `None`): its last place known by then, or the first known later.
-pub(super) fn place_at(entry: &ObjectEntry, moment: Option<Moment>) -> Option<(Pose, Option<ObjectId>)> {
+pub(crate) fn place_at(entry: &ObjectEntry, moment: Option<Moment>) -> Option<(Pose, Option<ObjectId>)> {
     let now = || entry.pose().map(|pose| (pose, entry.support));
     let Some(moment) = moment else { return now() };
     let places = entry.history.iter().filter_map(|h| h.place.map(|place| (h.moment, (place.pose, place.support))));
@@ -70,7 +70,9 @@ impl Grounder<'_> {
         };
         match recall {
             Recall::Known { ref evidence, .. }
-                if reference == PlaceReference::BeforeMoved && made_for(evidence) == Some(subtask) =>
+                if reference == PlaceReference::BeforeMoved
+                    && !self.moved_before.get()
+                    && made_for(evidence) == Some(subtask) =>
             {
                 let reason = format!("I moved {object} only for this, and saw no move before");
                 Recall::Unknown { reason, candidates: Vec::new() }
@@ -171,6 +173,7 @@ impl Grounder<'_> {
                 support: Some(entry.id),
                 pose: top_centre(self.view, entry)?,
                 tolerance_m: super::PLACE_TOLERANCE_M,
+                heading_tolerance_rad: None,
             };
             Some((place, 1.0))
         };

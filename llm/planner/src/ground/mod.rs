@@ -1,6 +1,7 @@
 //! References of a task grounded in memory: phrases to objects and places, with the reasons kept.
 
 pub(crate) mod geometry;
+mod group;
 mod history;
 mod object;
 mod place;
@@ -16,12 +17,18 @@ use acm_memory::{
     MemoryView,
     entry::{Moment, ObjectEntry, Presence},
 };
-use std::cell::RefCell;
+use std::{
+    cell::{Cell, RefCell},
+    collections::BTreeMap,
+};
 
+pub(crate) use history::place_at;
 pub(crate) use place::{like_places, surface_under};
 
 /// How far from a destination still counts as there, metres.
 pub(crate) const PLACE_TOLERANCE_M: f64 = 0.03;
+/// How far from a wanted heading still counts as right, radians.
+pub(crate) const HEADING_TOLERANCE_RAD: f64 = 0.26;
 /// Descriptions within descriptions that are followed.
 const MAX_DEPTH: u32 = 6;
 
@@ -30,16 +37,22 @@ const MAX_DEPTH: u32 = 6;
 pub(crate) struct Stuck {
     /// Whether another look may help.
     pub look: bool,
+    /// Whether a thing is not there to be seen: something may hide it.
+    pub absent: bool,
     /// What to say if it does not.
     pub unknown: Unknown,
 }
 
 impl Stuck {
     pub fn look(cause: GiveUpCause, text: String) -> Stuck {
-        Stuck { look: true, unknown: Unknown { cause, text } }
+        Stuck { look: true, absent: false, unknown: Unknown { cause, text } }
+    }
+    /// A thing is not there to be seen.
+    pub fn absent(text: String) -> Stuck {
+        Stuck { look: true, absent: true, unknown: Unknown { cause: GiveUpCause::Perception, text } }
     }
     pub fn give_up(cause: GiveUpCause, text: String) -> Stuck {
-        Stuck { look: false, unknown: Unknown { cause, text } }
+        Stuck { look: false, absent: false, unknown: Unknown { cause, text } }
     }
 }
 
@@ -58,7 +71,11 @@ pub(crate) struct Grounder<'a> {
     pub options: &'a PlanOptions,
     /// Whether another look may still be taken.
     pub may_look: bool,
+    /// Whether what is asked about was moved earlier in the same subtask because the subtask asks for that.
+    pub moved_before: Cell<bool>,
     found: RefCell<Vec<ResolvedReference>>,
+    /// The members of groups whose turn it is.
+    turns: RefCell<BTreeMap<ReferenceIndex, ObjectId>>,
 }
 
 impl<'a> Grounder<'a> {
@@ -69,7 +86,16 @@ impl<'a> Grounder<'a> {
         options: &'a PlanOptions,
         may_look: bool,
     ) -> Grounder<'a> {
-        Grounder { lexicon, task, view, options, may_look, found: RefCell::new(Vec::new()) }
+        Grounder {
+            lexicon,
+            task,
+            view,
+            options,
+            may_look,
+            moved_before: Cell::new(false),
+            found: RefCell::default(),
+            turns: RefCell::default(),
+        }
     }
     /// What the phrases were taken to mean, each once, in the order of asking.
     pub fn found(&self) -> Vec<ResolvedReference> {
@@ -81,7 +107,7 @@ impl<'a> Grounder<'a> {
             found.push(reference);
         }
     }
-    pub(super) fn phrase(&self, index: ReferenceIndex) -> &str {
+    pub fn phrase(&self, index: ReferenceIndex) -> &str {
         self.task.references.get(index).map_or("it", |reference| reference.phrase.as_str())
     }
     /// Where some of several things are confirmed and others are not: looks as long as looks are left, then goes
@@ -120,7 +146,7 @@ impl<'a> Grounder<'a> {
 
 /// The answer where an object's whereabouts are unknown.
 pub(crate) fn missing(id: ObjectId, phrase: &str) -> Stuck {
-    Stuck::look(GiveUpCause::Perception, format!("I do not know where {phrase} ({id}) is"))
+    Stuck::absent(format!("I do not know where {phrase} ({id}) is"))
 }
 
 /// Whether some part of an object has a function that declares this effect.

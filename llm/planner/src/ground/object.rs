@@ -8,7 +8,7 @@ use super::{
 use crate::{
     decision::GiveUpCause,
     explanation::ResolvedReference,
-    task::{Destination, Direction, Goal, ObjectReference, Quantity, Rank, ReferenceIndex, Size},
+    task::{Destination, Goal, ObjectReference, Quantity, Rank, ReferenceIndex, Size},
 };
 use acm_concept::{ids::ObjectId, task::OnUnknown};
 use acm_memory::{
@@ -36,6 +36,9 @@ impl<'a> Grounder<'a> {
     }
 
     pub(super) fn object_at(&self, index: ReferenceIndex, depth: u32) -> Result<Meant<ObjectId>, Stuck> {
+        if let Some(value) = self.turn(index) {
+            return Ok(Meant { value, guessed: false });
+        }
         let reference = self.reference(index)?;
         let (retrieval, mut contenders) = self.contenders(index, reference, depth)?;
         if reference.quantity == Quantity::TheOne {
@@ -90,7 +93,7 @@ impl<'a> Grounder<'a> {
         Ok(present)
     }
 
-    fn reference(&self, index: ReferenceIndex) -> Result<&'a ObjectReference, Stuck> {
+    pub(super) fn reference(&self, index: ReferenceIndex) -> Result<&'a ObjectReference, Stuck> {
         let text = || format!("the task has no reference {index}; read the instruction again");
         self.task.references.get(index).ok_or_else(|| Stuck::give_up(GiveUpCause::Plan, text()))
     }
@@ -101,7 +104,7 @@ impl<'a> Grounder<'a> {
         ChaCha8Rng::seed_from_u64(self.options.seed ^ salt.wrapping_mul(0x9E37_79B9_7F4A_7C15))
     }
 
-    fn contenders(
+    pub(super) fn contenders(
         &self,
         index: ReferenceIndex,
         reference: &ObjectReference,
@@ -150,7 +153,8 @@ impl<'a> Grounder<'a> {
     /// "Put the cube back where it was" speaks of a cube that has been moved, unless the instruction itself has it moved
     /// before.
     fn presupposes_move(&self, index: ReferenceIndex) -> bool {
-        let moving = self.task.subtasks.iter().map(|subtask| &subtask.goal).find(|g| g.object() == index && g.moves());
+        let moving =
+            self.task.subtasks.iter().map(|subtask| &subtask.goal).find(|g| g.object() == Some(index) && g.moves());
         let back = PlaceReference::BeforeMoved;
         matches!(moving, Some(Goal::At { destination: Destination::History { object, reference }, .. })
             if *object == index && *reference == back)
@@ -243,14 +247,14 @@ impl<'a> Grounder<'a> {
         chosen.map_or(ObjectId(0), |entry| entry.id)
     }
 
-    fn none_fits(&self, reference: &ObjectReference, retrieval: &Retrieval) -> Stuck {
+    pub(super) fn none_fits(&self, reference: &ObjectReference, retrieval: &Retrieval) -> Stuck {
         let considered = retrieval.hits.len() + retrieval.dropped.len();
         let text = match considered {
             0 => format!("I see nothing that could be {}", reference.phrase),
             1 => format!("I see no {}: the one object I know does not fit", bare(&reference.phrase)),
             _ => format!("I see no {}: none of {considered} objects fits", bare(&reference.phrase)),
         };
-        Stuck::look(GiveUpCause::Perception, text)
+        Stuck::absent(text)
     }
 }
 
@@ -291,7 +295,7 @@ fn keep_rank(contenders: &mut Vec<&ObjectEntry>, rank: Rank, began: Option<Momen
     let spot =
         |entry: &ObjectEntry| place_at(entry, began).map_or(DVec2::ZERO, |(pose, _)| pose.translation.truncate());
     let key = |entry: &ObjectEntry, middle: DVec2| match rank {
-        Rank::FromSide(_, side) => -spot(entry).dot(Direction::vector(side)),
+        Rank::FromSide(_, side) => -spot(entry).dot(side.vector().truncate()),
         Rank::Middle => spot(entry).distance(middle),
     };
     let middle = contenders.iter().map(|entry| spot(entry)).sum::<DVec2>() / contenders.len().max(1) as f64;

@@ -1,7 +1,7 @@
 //! Which place a destination means.
 
 use super::{
-    Grounder, MAX_DEPTH, Meant, PLACE_TOLERANCE_M, Stuck,
+    Grounder, HEADING_TOLERANCE_RAD, MAX_DEPTH, Meant, PLACE_TOLERANCE_M, Stuck,
     geometry::{Extent, symmetry, top_centre},
     has_effect,
     history::place_at,
@@ -21,6 +21,8 @@ use rand::Rng;
 
 /// Free space left between things that are put beside each other, metres.
 const BESIDE_GAP_M: f64 = 0.03;
+/// Thickness that the floor of a container is taken to have, metres.
+const FLOOR_M: f64 = 0.004;
 /// Colours within this delta E (CIE76) count as alike.
 const LIKE_COLOR: f64 = 30.0;
 /// Areas within this ratio count as alike.
@@ -37,7 +39,14 @@ impl Grounder<'_> {
                 let place = self.remembered(*object, of.value, *reference, subtask)?;
                 Ok(Meant { value: place.value, guessed: place.guessed || of.guessed })
             }
-            Destination::Exchanged { with, first } => self.exchanged(*with, *first, moved, subtask),
+            Destination::Exchanged { with, first, heading } => {
+                let mut place = self.exchanged(*with, *first, moved, subtask)?;
+                if let (true, Some(yaw)) = (heading, self.stood(*with, *first, subtask)?.map(|(pose, _)| pose.yaw())) {
+                    place.value.pose = Pose::from_yaw(place.value.pose.translation, yaw);
+                    place.value.heading_tolerance_rad = Some(HEADING_TOLERANCE_RAD);
+                }
+                Ok(place)
+            }
             other => self.spot(other, moved, 0),
         }
     }
@@ -50,6 +59,8 @@ impl Grounder<'_> {
         }
         match destination {
             Destination::On { reference } => self.on(*reference, moved, depth),
+            Destination::In { reference } => self.inside(*reference, moved, depth),
+            Destination::Under { reference } => self.under(*reference, moved, depth),
             Destination::Middle { of } => self.middle(*of, moved, depth),
             Destination::Between { first, second } => {
                 let (a, b) = (self.object_at(*first, depth)?, self.object_at(*second, depth)?);
@@ -79,9 +90,7 @@ impl Grounder<'_> {
             let text = format!("{phrase} is {moved} itself: nothing changes places with itself");
             return Err(Stuck::give_up(GiveUpCause::Plan, text));
         }
-        let began = if first { Some(subtask) } else { subtask.checked_sub(1) }.and_then(|since| self.began(since));
-        let stood = self.view.object(other.value).and_then(|entry| place_at(entry, began));
-        let (pose, support) = stood.ok_or_else(|| missing(other.value, phrase))?;
+        let (pose, support) = self.stood(with, first, subtask)?.ok_or_else(|| missing(other.value, phrase))?;
         if support == Some(moved) {
             let text = format!("{phrase} ({}) stands on {moved}: the two cannot change places", other.value);
             return Err(Stuck::give_up(GiveUpCause::Plan, text));
@@ -89,8 +98,25 @@ impl Grounder<'_> {
         let own_yaw = self.view.object(moved).and_then(ObjectEntry::pose).map_or(0.0, |pose| pose.yaw());
         let carrier = support.and_then(|id| self.view.object(id));
         let yaw = carrier.map_or(own_yaw, |carrier| self.aligned_yaw(carrier, moved));
-        let place = Place { support, pose: Pose::from_yaw(pose.translation, yaw), tolerance_m: PLACE_TOLERANCE_M };
+        let place = Place {
+            support,
+            pose: Pose::from_yaw(pose.translation, yaw),
+            tolerance_m: PLACE_TOLERANCE_M,
+            heading_tolerance_rad: None,
+        };
         Ok(Meant { value: place, guessed: other.guessed })
+    }
+
+    /// Where a thing stood, and what carried it, when its exchange with another began.
+    fn stood(
+        &self,
+        with: ReferenceIndex,
+        first: bool,
+        subtask: u32,
+    ) -> Result<Option<(Pose, Option<ObjectId>)>, Stuck> {
+        let began = if first { Some(subtask) } else { subtask.checked_sub(1) }.and_then(|since| self.began(since));
+        let other = self.object(with)?.value;
+        Ok(self.view.object(other).and_then(|entry| place_at(entry, began)))
     }
 
     fn on(&self, reference: ReferenceIndex, moved: ObjectId, depth: u32) -> Result<Meant<Place>, Stuck> {
@@ -105,8 +131,51 @@ impl Grounder<'_> {
             .ok_or_else(|| Stuck::look(GiveUpCause::Perception, format!("I do not know the shape of {phrase}")))?;
         let yaw = self.aligned_yaw(entry, moved);
         let pose = Pose::from_yaw(top.translation, yaw);
-        let place = Place { support: Some(entry.id), pose, tolerance_m: PLACE_TOLERANCE_M };
+        let place =
+            Place { support: Some(entry.id), pose, tolerance_m: PLACE_TOLERANCE_M, heading_tolerance_rad: None };
         Ok(Meant { value: place, guessed: under.guessed })
+    }
+
+    /// On the floor of what contains, at its middle; all of the floor counts as there.
+    fn inside(&self, reference: ReferenceIndex, moved: ObjectId, depth: u32) -> Result<Meant<Place>, Stuck> {
+        let around = self.object_at(reference, depth)?;
+        let phrase = self.phrase(reference);
+        if around.value == moved {
+            let text = format!("{phrase} is {moved} itself: nothing can be inside itself");
+            return Err(Stuck::give_up(GiveUpCause::Plan, text));
+        }
+        let (entry, pose) = self.present(around.value, phrase)?;
+        let extent = Extent::now(self.view, entry)
+            .ok_or_else(|| Stuck::look(GiveUpCause::Perception, format!("I do not know the shape of {phrase}")))?;
+        let own = self.view.object(moved).and_then(|moved| Extent::now(self.view, moved)).map_or(0.0, |e| e.radius());
+        let place = Place {
+            support: Some(entry.id),
+            pose: Pose::from_yaw(
+                pose.translation.truncate().extend(extent.low + FLOOR_M),
+                self.aligned_yaw(entry, moved),
+            ),
+            tolerance_m: (extent.radius() - own).max(PLACE_TOLERANCE_M),
+            heading_tolerance_rad: None,
+        };
+        Ok(Meant { value: place, guessed: around.guessed })
+    }
+
+    /// On what carries the thing, below its middle.
+    fn under(&self, reference: ReferenceIndex, moved: ObjectId, depth: u32) -> Result<Meant<Place>, Stuck> {
+        let over = self.object_at(reference, depth)?;
+        let (entry, pose) = self.present(over.value, self.phrase(reference))?;
+        let (support, height) = match (entry.support, self.view.support()) {
+            (Some(support), _) => (Some(support), pose.translation.z),
+            (None, Some(plane)) => (None, plane.height_at(pose.translation.x, pose.translation.y)),
+            (None, None) => (None, pose.translation.z),
+        };
+        let place = Place {
+            support,
+            pose: Pose::from_yaw(pose.translation.truncate().extend(height), self.aligned_yaw(entry, moved)),
+            tolerance_m: PLACE_TOLERANCE_M,
+            heading_tolerance_rad: None,
+        };
+        Ok(Meant { value: place, guessed: over.guessed })
     }
 
     /// The heading of what carries it, turned by as little as its symmetry allows.
@@ -167,7 +236,7 @@ impl Grounder<'_> {
         };
         let moved_entry = self.view.object(moved);
         let distance = radius(Some(entry)) + radius(moved_entry) + BESIDE_GAP_M;
-        let spot = |side: Direction| pose.translation.truncate() + side.vector() * distance;
+        let spot = |side: Direction| pose.translation.truncate() + side.vector().truncate() * distance;
         let others = |spot: DVec2| {
             let far = |entry: &&ObjectEntry| {
                 entry.id != moved
@@ -193,6 +262,7 @@ impl Grounder<'_> {
             support,
             pose: Pose::from_yaw(DVec3::new(spot.x, spot.y, height), pose.yaw()),
             tolerance_m: PLACE_TOLERANCE_M,
+            heading_tolerance_rad: None,
         }
     }
 }

@@ -2,7 +2,10 @@
 
 use crate::{
     lexicon::Lexicon,
-    task::{Destination, Direction, Goal, ObjectReference, Quantity, Rank, Size, Span, Task},
+    task::{
+        Condition, Destination, Direction, Goal, Manner, MannerKind, ObjectReference, Ordering, Quantity, Rank, Size,
+        Span, Task, Times, Variation,
+    },
 };
 use acm_memory::query::PlaceReference;
 use serde::{Deserialize, Serialize};
@@ -14,6 +17,7 @@ pub struct TaskForm {
     pub(super) things: Vec<ThingForm>,
     pub(super) steps: Vec<StepForm>,
     pub(super) untouched: Vec<usize>,
+    pub(super) manners: Vec<MannerForm>,
     pub(super) unclear: Option<String>,
 }
 
@@ -22,7 +26,8 @@ pub struct TaskForm {
 pub(super) struct ThingForm {
     pub phrase: String,
     pub occurrence: Option<usize>,
-    pub quantity: Quantity,
+    pub quantity: QuantityForm,
+    pub count: Option<u32>,
     pub noun: Option<String>,
     pub color: Option<String>,
     pub shade: Option<String>,
@@ -32,6 +37,11 @@ pub(super) struct ThingForm {
     pub free: bool,
     pub located: Option<PlaceForm>,
     pub other_than: Vec<usize>,
+    pub part_of: Option<usize>,
+    pub twin_of: Option<usize>,
+    pub contains: Vec<usize>,
+    pub states: Vec<StateForm>,
+    pub handled: Option<HandledForm>,
     pub function: Option<String>,
     pub affordance: Option<String>,
 }
@@ -41,11 +51,69 @@ pub(super) struct ThingForm {
 pub(super) struct StepForm {
     pub words: String,
     pub occurrence: Option<usize>,
+    /// The step that this one is a part of: what is done with each of a group, or to try.
+    pub part_of: Option<usize>,
     pub goal: GoalForm,
-    pub thing: usize,
+    pub thing: Option<usize>,
     pub to: Option<PlaceForm>,
     pub function: Option<String>,
     pub times: Option<u32>,
+    pub times_shown_by: Option<usize>,
+    pub state: Option<StateForm>,
+    pub order_from: Option<Direction>,
+    pub order_named: Vec<usize>,
+    pub vary: Option<Variation>,
+    pub until: Option<ConditionForm>,
+    pub only_if: Option<ConditionForm>,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct StateForm {
+    pub predicate: String,
+    pub holds: bool,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ConditionForm {
+    pub predicate: String,
+    pub things: Vec<usize>,
+    pub holds: bool,
+    pub judged_at: Option<u32>,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct HandledForm {
+    pub effect: String,
+    pub rank: i32,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct MannerForm {
+    pub words: String,
+    pub occurrence: Option<usize>,
+    pub kind: MannerWord,
+    pub thing: Option<usize>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum MannerWord {
+    OneAtATime,
+    OneToAPlace,
+    Aside,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum QuantityForm {
+    TheOne,
+    AnyOne,
+    Group,
+    Count,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -56,12 +124,15 @@ pub(super) struct PlaceForm {
     pub second: Option<usize>,
     pub side: Option<Direction>,
     pub past: Option<Past>,
+    pub heading: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub(super) enum PlaceKind {
     On,
+    In,
+    Under,
     Middle,
     Between,
     Beside,
@@ -83,6 +154,8 @@ pub(super) enum RankFrom {
     Right,
     Front,
     Back,
+    Up,
+    Down,
     Middle,
 }
 
@@ -94,6 +167,8 @@ impl RankFrom {
             RankFrom::Right => Some(Direction::Right),
             RankFrom::Front => Some(Direction::Front),
             RankFrom::Back => Some(Direction::Back),
+            RankFrom::Up => Some(Direction::Up),
+            RankFrom::Down => Some(Direction::Down),
             RankFrom::Middle => None,
         }
     }
@@ -103,6 +178,8 @@ impl RankFrom {
             Direction::Right => RankFrom::Right,
             Direction::Front => RankFrom::Front,
             Direction::Back => RankFrom::Back,
+            Direction::Up => RankFrom::Up,
+            Direction::Down => RankFrom::Down,
         }
     }
 }
@@ -114,16 +191,30 @@ pub(super) enum GoalForm {
     Holding,
     PutDown,
     Performed,
+    State,
+    Each,
+    Find,
+    Await,
 }
 
 impl TaskForm {
     /// The answer that stands for a task.
     pub(crate) fn new(lexicon: &Lexicon, task: &Task) -> TaskForm {
         let text = &task.instruction;
+        let mut steps = Vec::new();
+        for subtask in &task.subtasks {
+            StepForm::push(&mut steps, text, subtask.span, &subtask.goal, None);
+            // The step that stands for the whole is the first one pushed: its parts have none of their own.
+            let whole = steps.iter_mut().rev().find(|step| step.part_of.is_none());
+            if let (Some(whole), Some(condition)) = (whole, &subtask.when) {
+                whole.only_if = Some(ConditionForm::new(condition));
+            }
+        }
         TaskForm {
             things: task.references.iter().map(|reference| ThingForm::new(lexicon, text, reference)).collect(),
-            steps: task.subtasks.iter().map(|subtask| StepForm::new(text, subtask.span, &subtask.goal)).collect(),
+            steps,
             untouched: task.untouched.clone(),
+            manners: task.manners.iter().map(|manner| MannerForm::new(text, manner)).collect(),
             unclear: None,
         }
     }
@@ -140,10 +231,17 @@ impl ThingForm {
             Some(Rank::FromSide(number, side)) => (Some(number + 1), Some(RankFrom::of(side))),
             Some(Rank::Middle) => (None, Some(RankFrom::Middle)),
         };
+        let (quantity, count) = match reference.quantity {
+            Quantity::TheOne => (QuantityForm::TheOne, None),
+            Quantity::AnyOne => (QuantityForm::AnyOne, None),
+            Quantity::Group => (QuantityForm::Group, None),
+            Quantity::Count(count) => (QuantityForm::Count, Some(count)),
+        };
         ThingForm {
             phrase: reference.phrase.clone(),
             occurrence: occurrence(text, reference.span),
-            quantity: reference.quantity,
+            quantity,
+            count,
             noun: reference.noun.clone(),
             color: reference.color.as_ref().map(|color| color.name.clone()),
             shade: shade.map(|(word, _)| word.to_owned()),
@@ -153,6 +251,14 @@ impl ThingForm {
             free: reference.free,
             located: reference.located.as_deref().map(PlaceForm::new),
             other_than: reference.other_than.clone(),
+            part_of: reference.part_of,
+            twin_of: reference.twin_of,
+            contains: reference.contains.clone(),
+            states: reference.states.iter().map(|(predicate, holds)| StateForm::new(predicate, *holds)).collect(),
+            handled: reference
+                .handled
+                .as_ref()
+                .map(|handled| HandledForm { effect: handled.effect.clone(), rank: handled.rank }),
             function: reference.function.clone(),
             affordance: reference.affordance.clone(),
         }
@@ -160,25 +266,106 @@ impl ThingForm {
 }
 
 impl StepForm {
-    fn new(text: &str, span: Span, goal: &Goal) -> StepForm {
-        let (kind, to, function, times) = match goal {
-            Goal::At { destination, .. } => (GoalForm::At, Some(PlaceForm::new(destination)), None, None),
-            Goal::Holding { held: true, .. } => (GoalForm::Holding, None, None, None),
-            Goal::Holding { held: false, .. } => (GoalForm::PutDown, None, None, None),
-            Goal::Performed { function, times, .. } => {
-                (GoalForm::Performed, None, Some(function.clone()), Some(*times))
-            }
+    /// The step of a goal, and behind it those of the goals within it.
+    fn push(steps: &mut Vec<StepForm>, text: &str, span: Span, goal: &Goal, part_of: Option<usize>) {
+        let index = steps.len();
+        let mut step = StepForm {
+            words: span.of(text).to_owned(),
+            occurrence: occurrence(text, span),
+            part_of,
+            goal: GoalForm::At,
+            thing: goal.object(),
+            to: None,
+            function: None,
+            times: None,
+            times_shown_by: None,
+            state: None,
+            order_from: None,
+            order_named: Vec::new(),
+            vary: None,
+            until: None,
+            only_if: None,
         };
-        let (words, occurrence) = (span.of(text).to_owned(), occurrence(text, span));
-        StepForm { words, occurrence, goal: kind, thing: goal.object(), to, function, times }
+        let mut within: Vec<&Goal> = Vec::new();
+        match goal {
+            Goal::At { destination, .. } => step.to = Some(PlaceForm::new(destination)),
+            Goal::Holding { held, .. } => step.goal = if *held { GoalForm::Holding } else { GoalForm::PutDown },
+            Goal::Performed { function, times, .. } => {
+                step.goal = GoalForm::Performed;
+                step.function = Some(function.clone());
+                match times {
+                    Times::Count(count) => step.times = Some(*count),
+                    Times::Shown(by) => step.times_shown_by = Some(*by),
+                    Times::Until(condition) => step.until = Some(ConditionForm::new(condition)),
+                }
+            }
+            Goal::State { predicate, holds, .. } => {
+                step.goal = GoalForm::State;
+                step.state = Some(StateForm::new(predicate, *holds));
+            }
+            Goal::Each { order, body, .. } => {
+                step.goal = GoalForm::Each;
+                match order {
+                    Ordering::Any => {}
+                    Ordering::From(side) => step.order_from = Some(*side),
+                    Ordering::Named(named) => step.order_named.clone_from(named),
+                }
+                within.extend(body);
+            }
+            Goal::Find { vary, within: place, probe, sign, .. } => {
+                step.goal = GoalForm::Find;
+                step.vary = Some(*vary);
+                step.to = place.as_ref().map(PlaceForm::new);
+                step.until = sign.as_ref().map(ConditionForm::new);
+                within.extend(probe.as_deref());
+            }
+            Goal::Await { condition } => {
+                step.goal = GoalForm::Await;
+                step.until = Some(ConditionForm::new(condition));
+            }
+        }
+        steps.push(step);
+        for goal in within {
+            StepForm::push(steps, text, span, goal, Some(index));
+        }
+    }
+}
+
+impl StateForm {
+    fn new(predicate: &str, holds: bool) -> StateForm {
+        StateForm { predicate: predicate.to_owned(), holds }
+    }
+}
+
+impl ConditionForm {
+    fn new(condition: &Condition) -> ConditionForm {
+        ConditionForm {
+            predicate: condition.predicate.clone(),
+            things: condition.arguments.clone(),
+            holds: !condition.negated,
+            judged_at: condition.judged_at,
+        }
+    }
+}
+
+impl MannerForm {
+    fn new(text: &str, manner: &Manner) -> MannerForm {
+        let (kind, thing) = match manner.kind {
+            MannerKind::OneAtATime => (MannerWord::OneAtATime, None),
+            MannerKind::OneToAPlace => (MannerWord::OneToAPlace, None),
+            MannerKind::Aside(place) => (MannerWord::Aside, Some(place)),
+        };
+        MannerForm { words: manner.span.of(text).to_owned(), occurrence: occurrence(text, manner.span), kind, thing }
     }
 }
 
 impl PlaceForm {
     fn new(destination: &Destination) -> PlaceForm {
-        let plain = |kind, thing| PlaceForm { kind, thing, second: None, side: None, past: None };
+        let plain = |kind, thing| PlaceForm { kind, thing, second: None, side: None, past: None, heading: false };
         match destination {
             Destination::On { reference } => plain(PlaceKind::On, Some(*reference)),
+            Destination::In { reference } => plain(PlaceKind::In, Some(*reference)),
+            Destination::Under { reference } => plain(PlaceKind::Under, Some(*reference)),
             Destination::Middle { of } => plain(PlaceKind::Middle, *of),
             Destination::Between { first, second } => {
                 PlaceForm { second: Some(*second), ..plain(PlaceKind::Between, Some(*first)) }
@@ -186,7 +373,9 @@ impl PlaceForm {
             Destination::Beside { reference, side } => {
                 PlaceForm { side: *side, ..plain(PlaceKind::Beside, Some(*reference)) }
             }
-            Destination::Exchanged { with, .. } => plain(PlaceKind::InPlaceOf, Some(*with)),
+            Destination::Exchanged { with, heading, .. } => {
+                PlaceForm { heading: *heading, ..plain(PlaceKind::InPlaceOf, Some(*with)) }
+            }
             Destination::History { object, reference } => {
                 let past = match reference {
                     PlaceReference::BeforeMoved => Some(Past::BeforeMoved),

@@ -95,7 +95,7 @@ fn the_schema_has_the_fields_and_the_words_of_the_form() {
 fn the_prompt_names_the_instruction_and_what_the_library_has() {
     let (planner, library) = mind();
     let prompt = planner.prompt(CANONICAL, &library).unwrap();
-    assert_eq!((prompt.id.as_str(), prompt.version), ("parse", 1));
+    assert_eq!((prompt.id.as_str(), prompt.version), ("parse", 2));
     assert!(prompt.user.contains(CANONICAL) && prompt.system.contains("- cube: pick, place"));
     assert!(!prompt.system.contains('{') && !prompt.user.contains('{'), "a gap was not filled");
     assert!(!prompt.schema.to_string().contains("{nouns}"));

@@ -8,7 +8,9 @@ use super::{
 };
 use crate::{
     lexicon::FrameGoal,
-    task::{Destination, Goal, ObjectReference, Quantity, ReferenceIndex, Span, Subtask, Task, functions_with_effect},
+    task::{
+        Destination, Goal, ObjectReference, Quantity, ReferenceIndex, Span, Subtask, Task, Times, functions_with_effect,
+    },
 };
 use acm_concept::template::TemplateLibrary;
 use acm_memory::query::PlaceReference;
@@ -30,7 +32,7 @@ pub(super) fn interpret(library: &TemplateLibrary, text: &str, statements: &[Sta
     let (subtasks, mut references) = (reading.subtasks, reading.references);
     settle_subtasks(&subtasks, &mut references);
     let nouns = nouns_of(&references);
-    Ok(Task { instruction: text.into(), subtasks, references, untouched, nouns })
+    Ok(Task { instruction: text.into(), subtasks, references, untouched, nouns, manners: Vec::new() })
 }
 
 struct Interpretation<'a> {
@@ -64,7 +66,7 @@ impl Interpretation<'_> {
     }
 
     fn subtask(&self, clause: &Clause, goal: Goal) -> Subtask {
-        Subtask { text: clause.span.of(self.text).into(), span: clause.span, goal }
+        Subtask { text: clause.span.of(self.text).into(), span: clause.span, goal, when: None }
     }
 
     /// Where the next subtask belongs. The two halves of an exchange are never parted.
@@ -84,7 +86,7 @@ impl Interpretation<'_> {
         let Some(PlacePhrase { kind: PlaceKind::On(other), .. }) = &clause.place else {
             return Err(self.unsupported(clause.span, "it does not say with what"));
         };
-        let role = Role::Effect("at");
+        let role = Role::Effect("at".into());
         let one = match &clause.object {
             Some(phrase) => self.reference(phrase, &role)?,
             None => self.antecedent(clause.span, &role)?,
@@ -95,7 +97,10 @@ impl Interpretation<'_> {
             return Err(self.unsupported(clause.span, "two things that can be told apart change places, no more"));
         }
         let at = self.place_in_order(order);
-        let goal = |object, with, first| Goal::At { object, destination: Destination::Exchanged { with, first } };
+        let goal = |object, with, first| Goal::At {
+            object,
+            destination: Destination::Exchanged { with, first, heading: false },
+        };
         let halves = [self.subtask(clause, goal(one, other, true)), self.subtask(clause, goal(other, one, false))];
         self.subtasks.splice(at..at, halves);
         Ok(())
@@ -116,8 +121,8 @@ impl Interpretation<'_> {
 
     fn goal(&mut self, clause: &Clause) -> Result<Goal, ParseError> {
         let role = match &clause.goal {
-            FrameGoal::At | FrameGoal::Exchange | FrameGoal::Nothing => Role::Effect("at"),
-            FrameGoal::Holding(_) => Role::Effect("holding"),
+            FrameGoal::At | FrameGoal::Exchange | FrameGoal::Nothing => Role::Effect("at".into()),
+            FrameGoal::Holding(_) => Role::Effect("holding".into()),
             FrameGoal::Performed(function) => Role::Function(function.clone()),
         };
         let object = match &clause.object {
@@ -130,7 +135,7 @@ impl Interpretation<'_> {
         Ok(match &clause.goal {
             FrameGoal::Holding(held) => Goal::Holding { object, held: *held },
             FrameGoal::Performed(function) => {
-                Goal::Performed { function: function.clone(), object, times: clause.times.unwrap_or(1) }
+                Goal::Performed { function: function.clone(), object, times: Times::Count(clause.times.unwrap_or(1)) }
             }
             FrameGoal::At | FrameGoal::Exchange | FrameGoal::Nothing => {
                 let destination = match (&clause.place, clause.history) {
@@ -176,9 +181,9 @@ impl Interpretation<'_> {
             }
             PlaceKind::History(owner, reference) => {
                 let object = match (owner, moved) {
-                    (Some(phrase), _) => self.reference(phrase, &Role::Effect("at"))?,
+                    (Some(phrase), _) => self.reference(phrase, &Role::Effect("at".into()))?,
                     (None, Some(moved)) => moved,
-                    (None, None) => self.antecedent(place.span, &Role::Effect("at"))?,
+                    (None, None) => self.antecedent(place.span, &Role::Effect("at".into()))?,
                 };
                 Destination::History { object, reference: *reference }
             }
@@ -221,6 +226,11 @@ impl Interpretation<'_> {
             free: phrase.free,
             located,
             other_than,
+            part_of: None,
+            twin_of: None,
+            contains: Vec::new(),
+            states: Vec::new(),
+            handled: None,
         };
         require(&mut reference, role, self.library);
         self.references.push(reference);
@@ -276,7 +286,7 @@ impl Interpretation<'_> {
         let single = |index: ReferenceIndex| self.references.get(index).filter(|r| r.quantity != Quantity::Group);
         let fits =
             |index: &ReferenceIndex| single(*index).is_some_and(|known| role.fits(self.library, known.noun.as_deref()));
-        let acted_on = self.subtasks.iter().rev().map(|subtask| subtask.goal.object());
+        let acted_on = self.subtasks.iter().rev().filter_map(|subtask| subtask.goal.object());
         let mentioned = (0..self.references.len()).rev();
         acted_on
             .chain(mentioned)
@@ -325,15 +335,12 @@ pub(crate) fn settle_subtasks(subtasks: &[Subtask], references: &mut [ObjectRefe
         reference.subtask = u32::MAX;
     }
     for (subtask, index) in subtasks.iter().zip(0..) {
-        let mut used = vec![subtask.goal.object()];
-        if let Goal::At { destination, .. } = &subtask.goal {
-            used.extend(named_in(destination));
-        }
+        let mut used = subtask.goal.references();
+        used.extend(subtask.when.iter().flat_map(|condition| &condition.arguments));
         while let Some(next) = used.pop() {
             let Some(reference) = references.get_mut(next).filter(|r| r.subtask == u32::MAX) else { continue };
             reference.subtask = index;
-            used.extend(reference.located.as_deref().map(named_in).unwrap_or_default());
-            used.extend(&reference.other_than);
+            used.extend(reference.references());
         }
     }
     for reference in references.iter_mut().filter(|r| r.subtask == u32::MAX) {
@@ -350,17 +357,6 @@ pub(crate) fn nouns_of(references: &[ObjectReference]) -> Vec<String> {
         }
     }
     nouns
-}
-
-/// References in a destination.
-fn named_in(destination: &Destination) -> Vec<ReferenceIndex> {
-    match destination {
-        Destination::On { reference } | Destination::Beside { reference, .. } => vec![*reference],
-        Destination::Middle { of } => of.iter().copied().collect(),
-        Destination::Between { first, second } => vec![*first, *second],
-        Destination::Exchanged { with, .. } => vec![*with],
-        Destination::History { object, .. } => vec![*object],
-    }
 }
 
 /// Writes down what the role asks of the thing, where that is more than was asked so far.

@@ -15,7 +15,7 @@ mod token;
 pub use clause::MAX_CLAUSES;
 pub use error::ParseError;
 pub(crate) use interpret::{nouns_of, settle_subtasks};
-pub(crate) use role::{Role, SUPPORTIVE};
+pub(crate) use role::{CONTAINS, Role, SUPPORTIVE};
 pub use token::{MAX_BYTES, MAX_TOKENS};
 
 use crate::{lexicon::Lexicon, task::Task};

@@ -1,15 +1,18 @@
 //! What a thing must be able to do to fill a gap in a goal.
 
+use crate::task::functions_with_effect;
 use acm_concept::template::TemplateLibrary;
 
 /// Affordance of what can carry things.
 pub(crate) const SUPPORTIVE: &str = "supportive";
+/// Affordance of what things can be put into.
+pub(crate) const CONTAINS: &str = "contains";
 
 /// What a thing must be able to do to fill a gap in a goal.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Role {
     /// Be brought about by some function with this effect.
-    Effect(&'static str),
+    Effect(String),
     /// Offer this function.
     Function(String),
     /// Have this affordance.
@@ -22,6 +25,12 @@ impl Role {
     /// Whether some template that carries the noun can play the role; a thing without noun may.
     pub(crate) fn fits(&self, library: &TemplateLibrary, noun: Option<&str>) -> bool {
         let Some(noun) = noun else { return true };
+        if let Role::Effect(predicate) = self
+            && functions_with_effect(library, predicate).is_empty()
+        {
+            // Nothing that is known does it: that is the planner's to say, and no reason to take the noun for another.
+            return true;
+        }
         library.with_noun(noun).any(|template| match self {
             Role::Effect(predicate) => template
                 .functions
@@ -37,9 +46,13 @@ impl Role {
     pub(crate) fn misfit(&self, library: &TemplateLibrary, noun: Option<&str>) -> Option<String> {
         let (name, false) = (noun?, self.fits(library, noun)) else { return None };
         Some(match self {
-            Role::Effect("holding") => format!("no kind of {name} that I know can be picked up"),
-            Role::Effect(_) => format!("no kind of {name} that I know can be moved"),
+            Role::Effect(effect) => match effect.as_str() {
+                "holding" => format!("no kind of {name} that I know can be picked up"),
+                "at" => format!("no kind of {name} that I know can be moved"),
+                other => format!("no kind of {name} that I know can be made {other}"),
+            },
             Role::Function(function) => format!("no kind of {name} that I know has the function {function}"),
+            Role::Affordance(CONTAINS) => format!("no kind of {name} that I know can hold things inside"),
             Role::Affordance(_) => format!("no kind of {name} that I know can carry things"),
             Role::Mentioned => return None,
         })

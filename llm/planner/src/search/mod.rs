@@ -4,6 +4,7 @@
 //! needs and is not so becomes a goal before it. Partial plans are tried in the order of their cost: expected
 //! failures and length. Nothing here knows a task: the skills, their conditions and effects come from memory.
 
+mod derived;
 mod state;
 
 use crate::explanation::{Rejected, step_words};
@@ -12,7 +13,10 @@ use acm_concept::{
     literal::{Belief, Literal, Place, Term, Truth},
 };
 use acm_memory::{MemoryView, query::SkillCandidate};
-use state::{State, same_atom};
+use state::State;
+
+pub(crate) use derived::{brings_about, is_cover};
+pub(crate) use state::same_atom;
 use std::{
     cmp::Ordering,
     collections::{BTreeMap, BinaryHeap},
@@ -40,6 +44,8 @@ pub(crate) enum Want {
     Holds(Literal),
     /// The function is performed on the object, whatever holds already.
     Perform { function: String, object: ObjectId },
+    /// The object stands on some free spot, elsewhere than now.
+    Away(ObjectId),
 }
 
 /// What a search has to know besides memory.
@@ -104,6 +110,18 @@ struct Node<'v> {
     assumed: Vec<Literal>,
 }
 
+/// What is believed of a literal: by memory, or concluded from what memory believes of where things stand.
+pub(crate) fn believed(view: &dyn MemoryView, literal: &Literal) -> Belief {
+    State::now(view).belief(literal)
+}
+
+/// What a cover is believed to stand over.
+pub(crate) fn covered_by(view: &dyn MemoryView, cover: ObjectId) -> Vec<ObjectId> {
+    let state = State::now(view);
+    let others = view.objects().iter().filter(|entry| entry.id != cover && !is_cover(entry));
+    others.map(|entry| entry.id).filter(|id| state.covering(*id).contains(&cover)).collect()
+}
+
 /// Looks for the cheapest plan that reaches all wants.
 pub(crate) fn search(view: &dyn MemoryView, wants: &[Want], limits: &Limits) -> Found {
     let reserved = wants.iter().filter_map(|want| match want {
@@ -124,6 +142,7 @@ pub(crate) fn search(view: &dyn MemoryView, wants: &[Want], limits: &Limits) -> 
     let agenda = wants.iter().rev().map(|want| match want {
         Want::Holds(literal) => Item::Achieve(Condition::Literal(literal.clone())),
         Want::Perform { function, object } => Item::Perform { function: function.clone(), object: *object },
+        Want::Away(object) => Item::PutAside(*object),
     });
     search.push(Node {
         cost: 0.0,
@@ -138,7 +157,7 @@ pub(crate) fn search(view: &dyn MemoryView, wants: &[Want], limits: &Limits) -> 
         if let Some(solved) = search.expand(node) {
             let holds = |want: &Want| match want {
                 Want::Holds(literal) => solved.state.belief(literal).truth == Truth::Yes,
-                Want::Perform { .. } => true,
+                Want::Perform { .. } | Want::Away(_) => true,
             };
             if wants.iter().all(holds) && !solved.steps.is_empty() {
                 search.found.assumed = search.undecided(&solved);
@@ -183,7 +202,7 @@ impl<'v> Search<'v, '_> {
                     return None;
                 }
                 Item::PutAside(object) => {
-                    let Some(spot) = node.state.free_spot(object, &self.reserved) else {
+                    let Some(spot) = node.state.free_spot(object, &self.spoken_for(&node.agenda)) else {
                         self.reject(format!("moving {object} away"), None, "I see no free spot for it".into());
                         return None;
                     };
@@ -199,7 +218,7 @@ impl<'v> Search<'v, '_> {
                     return None;
                 }
                 Item::Apply { candidate, purpose, repairs } => {
-                    let missing = self.conditions(&candidate).into_iter();
+                    let missing = self.conditions(&node, &candidate).into_iter();
                     let missing: Vec<Condition> = missing.filter(|c| self.truth(&node, c) != Truth::Yes).collect();
                     if missing.is_empty() {
                         self.apply(&mut node, *candidate);
@@ -216,6 +235,15 @@ impl<'v> Search<'v, '_> {
             }
         }
         Some(node)
+    }
+
+    /// Places where something shall come to stand: for the goals, and for the steps that are planned already.
+    fn spoken_for(&self, agenda: &[Item]) -> Vec<(ObjectId, Place)> {
+        let planned = agenda.iter().filter_map(|item| match item {
+            Item::Apply { candidate, .. } => Some((candidate.part.object, candidate.destination?)),
+            _ => None,
+        });
+        self.reserved.iter().copied().chain(planned).collect()
     }
 
     fn truth(&self, node: &Node<'v>, condition: &Condition) -> Truth {
@@ -238,10 +266,13 @@ impl<'v> Search<'v, '_> {
         }
     }
 
-    /// What must be so for a step; the place is made free while the hand still is.
-    fn conditions(&self, candidate: &SkillCandidate) -> Vec<Condition> {
-        let free = candidate.destination.map(|place| Condition::Free { place, object: candidate.part.object });
-        free.into_iter().chain(candidate.preconditions.iter().cloned().map(Condition::Literal)).collect()
+    /// What must be so for a step; the place is made free while the hand still is, and what the step acts on is laid bare
+    /// before that.
+    fn conditions(&self, node: &Node<'v>, candidate: &SkillCandidate) -> Vec<Condition> {
+        let object = candidate.part.object;
+        let bare = derived::hidden_by(&node.state, object).into_iter().map(Condition::Literal);
+        let free = candidate.destination.map(|place| Condition::Free { place, object });
+        bare.chain(free).chain(candidate.preconditions.iter().cloned().map(Condition::Literal)).collect()
     }
 
     fn apply(&self, node: &mut Node<'v>, candidate: SkillCandidate) {
@@ -267,7 +298,16 @@ impl<'v> Search<'v, '_> {
                 let carried = literal.subject().map(|under| node.state.carried_by(under)).unwrap_or_default();
                 self.move_away(node, carried);
             }
+            Condition::Literal(literal) if literal.predicate == "covered" && literal.negated => {
+                let covering = literal.subject().map(|object| node.state.covering(object)).unwrap_or_default();
+                self.move_away(node, covering);
+            }
             Condition::Literal(literal) => {
+                for ways in derived::ways(&node.state, literal) {
+                    let mut next = node.clone();
+                    next.agenda.extend(ways.into_iter().rev().map(|way| Item::Achieve(Condition::Literal(way))));
+                    self.push(next);
+                }
                 for candidate in self.achievers(node, literal) {
                     self.consider(node, candidate, Some(condition.clone()));
                 }
@@ -301,7 +341,7 @@ impl<'v> Search<'v, '_> {
         let Some(object) = literal.subject().or_else(|| node.state.held()) else { return Vec::new() };
         let mut candidates = self.view.skill_candidates(object, destination);
         if destination.is_none() && node.state.held() == Some(object) {
-            let spot = node.state.free_spot(object, &self.reserved);
+            let spot = node.state.free_spot(object, &self.spoken_for(&node.agenda));
             candidates = self.view.skill_candidates(object, spot);
         }
         let declares = |candidate: &SkillCandidate| {
@@ -325,7 +365,7 @@ impl<'v> Search<'v, '_> {
             self.note_what_is_missing(&candidate);
         }
         let mut next = node.clone();
-        let conditions = self.conditions(&candidate);
+        let conditions = self.conditions(node, &candidate);
         next.agenda.push(Item::Apply { candidate: Box::new(candidate), purpose, repairs: 0 });
         next.agenda.extend(conditions.into_iter().rev().map(Item::Achieve));
         self.push(next);

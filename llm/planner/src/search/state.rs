@@ -1,10 +1,15 @@
 //! What would be so after some steps: memory's beliefs with the steps' effects laid over them.
 
-use crate::ground::{PLACE_TOLERANCE_M, geometry::Extent, has_effect, surface_under};
+use crate::ground::{
+    PLACE_TOLERANCE_M,
+    geometry::{Extent, symmetry},
+    has_effect, surface_under,
+};
 use acm_concept::{
     ids::ObjectId,
     literal::{Belief, Evidence, Literal, Place, Term, Truth},
     pose::Pose,
+    template::YawSymmetry,
 };
 use acm_memory::{
     MemoryView,
@@ -17,8 +22,9 @@ use std::collections::BTreeMap;
 const TOUCH_M: f64 = 0.003;
 /// Distance that is kept round things put aside, metres.
 const CLEARANCE_M: f64 = 0.03;
-/// How far beyond the outermost things a free spot is looked for, metres.
-const MARGIN_M: f64 = 0.05;
+/// How far beyond the outermost things a free spot is looked for, metres: farther where there is none nearer, since
+/// nothing is known of the table's edge and of the arm's reach there.
+const MARGINS_M: [f64; 3] = [0.05, 0.12, 0.2];
 /// Rings on which free spots are looked for: first radius, step, and number, metres.
 const RINGS_M: (f64, f64, u32) = (0.08, 0.03, 14);
 /// Spots on a ring.
@@ -47,7 +53,11 @@ impl<'v> State<'v> {
     /// What is believed of a literal in this state.
     pub fn belief(&self, literal: &Literal) -> Belief {
         let positive = Literal { negated: false, ..literal.clone() };
-        let mut belief = self.imagined(&positive).unwrap_or_else(|| self.view.belief(&positive));
+        let mut belief = self.imagined(&positive).unwrap_or_else(|| {
+            let remembered = self.view.belief(&positive);
+            let unknown = remembered.truth == Truth::Unknown;
+            if unknown { super::derived::concluded(self, &positive).unwrap_or(remembered) } else { remembered }
+        });
         if literal.negated {
             belief.truth = belief.truth.negate();
         }
@@ -62,13 +72,21 @@ impl<'v> State<'v> {
         if self.moved.is_empty() {
             return None;
         }
+        if let Some(belief) = super::derived::concluded(self, literal) {
+            return Some(belief);
+        }
         let subject = literal.subject();
         match literal.predicate.as_str() {
             "clear" => Some(inferred(self.carried_by(subject?).is_empty(), "by what stands on it then")),
             "at" => match (self.moved.get(&subject?)?, literal.arguments.get(1)?) {
                 (Whereabouts::Standing(place), Term::Place(wanted)) => {
                     let apart = flat(&place.pose).distance(flat(&wanted.pose));
-                    Some(inferred(apart <= wanted.tolerance_m, "by where it stands then"))
+                    let turned = wanted.heading_tolerance_rad.is_some_and(|allowed| {
+                        let entry = subject.and_then(|id| self.view.object(id));
+                        let symmetry = entry.map_or(YawSymmetry::Fold(1), |entry| symmetry(self.view, entry));
+                        symmetry.difference(place.pose.yaw(), wanted.pose.yaw()) > allowed
+                    });
+                    Some(inferred(apart <= wanted.tolerance_m && !turned, "by where it stands then"))
                 }
                 _ => Some(inferred(false, "it is in the hand then")),
             },
@@ -134,16 +152,58 @@ impl<'v> State<'v> {
         self.view.objects().iter().filter(on_it).map(|entry| entry.id).collect()
     }
 
+    /// Memory as it is.
+    pub fn view(&self) -> &'v dyn MemoryView {
+        self.view
+    }
+
+    /// What an object takes up in this state; `None` while it is held or missing.
+    pub fn extent(&self, object: ObjectId) -> Option<Extent> {
+        let entry = self.view.object(object)?;
+        Extent::at(self.view, entry, &self.standing(entry)?)
+    }
+
+    /// Where an object stands in this state and what carries it.
+    pub fn place(&self, object: ObjectId) -> Option<(Pose, Option<ObjectId>)> {
+        let entry = self.view.object(object)?;
+        let support = match self.moved.get(&object) {
+            Some(Whereabouts::Standing(place)) => place.support,
+            _ => entry.support,
+        };
+        Some((self.standing(entry)?, support))
+    }
+
+    /// Covers that stand over an object.
+    pub fn covering(&self, object: ObjectId) -> Vec<ObjectId> {
+        let covers = self.view.objects().iter().filter(|entry| entry.id != object && super::derived::is_cover(entry));
+        let stands_over = |entry: &&ObjectEntry| self.stands_over(entry.id, object);
+        covers.filter(stands_over).map(|entry| entry.id).collect()
+    }
+
+    fn stands_over(&self, cover: ObjectId, object: ObjectId) -> bool {
+        let (Some(over), Some((pose, _))) = (self.extent(cover), self.place(object)) else { return false };
+        over.covers(flat(&pose)) && pose.translation.z > over.low - TOUCH_M && pose.translation.z < over.high
+    }
+
     /// Things that stand where `object` shall stand, other than what carries the place.
     pub fn in_the_way(&self, place: &Place, object: ObjectId) -> Vec<ObjectId> {
         let Some(wanted) = self.view.object(object).and_then(|e| Extent::at(self.view, e, &place.pose)) else {
             return Vec::new();
         };
+        let covers = self.view.object(object).is_some_and(super::derived::is_cover);
         let hinders = |entry: &&ObjectEntry| {
             if entry.id == object || place.support == Some(entry.id) {
                 return false;
             }
             let extent = self.standing(entry).and_then(|pose| Extent::at(self.view, entry, &pose));
+            // A cover goes round what stands where it shall stand; what is put inside goes between walls.
+            let goes_round = |outer: &Extent, inner: &Extent| {
+                outer.radius() > inner.radius() && outer.high - outer.low > inner.high - inner.low
+            };
+            let fits = extent.as_ref().is_some_and(|extent| covers && goes_round(&wanted, extent));
+            if fits {
+                return false;
+            }
             extent.is_some_and(|extent| extent.gap(&wanted) < -TOUCH_M && extent.shared_height(&wanted) > TOUCH_M)
         };
         self.view.objects().iter().filter(hinders).map(|entry| entry.id).collect()
@@ -163,8 +223,8 @@ impl<'v> State<'v> {
         let spots: Vec<DVec2> = standing.iter().map(|(_, pose)| flat(pose)).collect();
         let middle = spots.iter().sum::<DVec2>() / spots.len().max(1) as f64;
         let start = self.standing(entry).map_or(middle, |pose| flat(&pose));
-        let low = spots.iter().fold(start, |a, b| a.min(*b)) - MARGIN_M;
-        let high = spots.iter().fold(start, |a, b| a.max(*b)) + MARGIN_M;
+        let known = || spots.iter().copied().chain(reserved.iter().map(|(_, place)| flat(&place.pose)));
+        let (low, high) = (known().fold(start, DVec2::min), known().fold(start, DVec2::max));
         let taken = |keep_off_flat: bool| -> Vec<Extent> {
             let things = standing
                 .iter()
@@ -175,10 +235,11 @@ impl<'v> State<'v> {
             extents.chain(reserved).collect()
         };
         let yaw = entry.pose().map_or(0.0, |pose| pose.yaw());
-        for keep_off_flat in [true, false] {
+        for (keep_off_flat, margin) in [true, false].into_iter().flat_map(|keep| MARGINS_M.map(|margin| (keep, margin)))
+        {
             let taken = taken(keep_off_flat);
             for spot in ring_spots(start) {
-                let inside = spot.cmpge(low).all() && spot.cmple(high).all();
+                let inside = spot.cmpge(low - margin).all() && spot.cmple(high + margin).all();
                 let place = self.place_at(spot, object, yaw);
                 let extent = place.and_then(|place| Extent::at(self.view, entry, &place.pose));
                 let free = |extent: &Extent| taken.iter().all(|other| other.gap(extent) > CLEARANCE_M);
@@ -193,7 +254,7 @@ impl<'v> State<'v> {
     fn place_at(&self, spot: DVec2, object: ObjectId, yaw: f64) -> Option<Place> {
         let (support, height) = surface_under(self.view, spot, object);
         let pose = Pose::from_yaw(DVec3::new(spot.x, spot.y, height?), yaw);
-        Some(Place { support, pose, tolerance_m: PLACE_TOLERANCE_M })
+        Some(Place { support, pose, tolerance_m: PLACE_TOLERANCE_M, heading_tolerance_rad: None })
     }
 }
 
@@ -225,7 +286,7 @@ fn inferred(holds: bool, how: &str) -> Belief {
 }
 
 /// Whether two literals speak of the same, whatever their signs. Places are the same within a micrometre.
-pub(super) fn same_atom(a: &Literal, b: &Literal) -> bool {
+pub(crate) fn same_atom(a: &Literal, b: &Literal) -> bool {
     let same_term = |a: &Term, b: &Term| match (a, b) {
         (Term::Place(a), Term::Place(b)) => a.pose.translation.distance(b.pose.translation) < 1e-6,
         (Term::Object(id), Term::Part(part)) | (Term::Part(part), Term::Object(id)) => part.object == *id,

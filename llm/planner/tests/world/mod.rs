@@ -1,6 +1,7 @@
 //! A symbolic world with a memory of it: objects stand where they were put, skills bring about their declared
 //! effects unless a fault is scripted. It implements [`MemoryView`] on its own, so that the planner is tested
 //! against the interface and not against one memory.
+#![allow(dead_code, reason = "each test program uses a part of it")]
 
 use acm_concept::{
     color::{Appearance, Lab},
@@ -23,7 +24,7 @@ use acm_memory::{
 };
 use acm_planner::{Decision, PlanOptions, Planner, Situation, Step, Task};
 use glam::{DVec2, DVec3};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 pub const RED: [u8; 3] = [210, 30, 30];
 pub const BLUE: [u8; 3] = [0, 128, 254];
@@ -60,9 +61,74 @@ pub struct World {
     /// Where things lie that memory holds to be missing.
     pub lost: BTreeMap<ObjectId, DVec2>,
     pub faults: Vec<(&'static str, u32, Fault)>,
+    /// What holds besides what follows from where things stand, as literals in text.
+    pub facts: BTreeSet<String>,
+    /// Predicates of which the robot can see whether they hold.
+    pub visible: BTreeSet<String>,
     runs: BTreeMap<String, u32>,
     pub done_skills: Vec<String>,
 }
+
+/// A thing whose two ends differ: turned by half a turn it is not what it was.
+const CELL: &str = r#"
+template = "cell"
+seen_by = "depth"
+prior = 0.5
+affordances = ["graspable"]
+constraints = []
+
+[synopsis]
+description = "a block whose ends differ"
+affordance = "it can be grasped across its sides"
+intended_use = "to give current"
+nouns = [{ noun = "cell" }]
+
+[[parameter]]
+name = "length"
+unit = "m"
+min = 0.02
+max = 0.1
+initial = "extent_x"
+
+[[parameter]]
+name = "width"
+unit = "m"
+min = 0.01
+max = 0.06
+initial = "extent_y"
+
+[[parameter]]
+name = "height"
+unit = "m"
+min = 0.01
+max = 0.06
+initial = "extent_z"
+
+[[solid]]
+shape = "box"
+size = ["length", "width", "height"]
+position = ["0", "0", "height / 2"]
+
+[[frame]]
+name = "base"
+position = ["0", "0", "0"]
+
+[[function]]
+name = "pick"
+kind = "grasp-from-above"
+frame = "base"
+arguments = { grip_width = "width", cross_width = "length", height = "height" }
+preconditions = ["hand-empty()", "clear(?self)"]
+effects = ["holding(?self)", "not hand-empty()"]
+
+[[function]]
+name = "place"
+kind = "place-upright"
+frame = "base"
+arguments = { grip_width = "width", height = "height" }
+preconditions = ["holding(?self)"]
+effects = ["at(?self, ?destination)", "not holding(?self)", "hand-empty()"]
+"#;
 
 pub fn library() -> TemplateLibrary {
     TemplateLibrary::parse([
@@ -70,6 +136,8 @@ pub fn library() -> TemplateLibrary {
         ("button.toml", include_str!("../../../../memory/library/button.toml")),
         ("cylinder.toml", include_str!("../../../../memory/library/cylinder.toml")),
         ("mat.toml", include_str!("../../../../memory/library/mat.toml")),
+        ("cover.toml", include_str!("../../../../memory/library/household/cover.toml")),
+        ("cell.toml", CELL),
     ])
     .unwrap()
 }
@@ -89,6 +157,8 @@ impl World {
             candidates: Vec::new(),
             lost: BTreeMap::new(),
             faults: Vec::new(),
+            facts: BTreeSet::new(),
+            visible: BTreeSet::new(),
             runs: BTreeMap::new(),
             done_skills: Vec::new(),
         }
@@ -114,6 +184,12 @@ impl World {
     }
     pub fn block(&mut self, at: DVec2, edge: f64, color: [u8; 3], on: Option<ObjectId>) -> ObjectId {
         self.add("box", &[("length", edge), ("width", edge), ("height", edge)], at, color, on)
+    }
+    pub fn cover(&mut self, at: DVec2) -> ObjectId {
+        self.add("cover", &[("length", 0.1), ("width", 0.1), ("height", 0.09)], at, GREY, None)
+    }
+    pub fn cell(&mut self, at: DVec2) -> ObjectId {
+        self.add("cell", &[("length", 0.06), ("width", 0.03), ("height", 0.03)], at, BLUE, None)
     }
     pub fn button(&mut self, at: DVec2) -> ObjectId {
         self.add("button", &[("radius", 0.03), ("height", 0.02)], at, RED, None)
@@ -164,7 +240,7 @@ impl World {
             ambiguous_with: Vec::new(),
             history: vec![HistoryEntry {
                 moment: moment(Time::ZERO),
-                place: Some(Place { support: on, pose, tolerance_m: 0.03 }),
+                place: Some(Place { support: on, pose, tolerance_m: 0.03, heading_tolerance_rad: None }),
                 cause: PlaceCause::Seen(FrameId(0)),
                 verified: true,
             }],
@@ -202,7 +278,12 @@ impl World {
         let now = moment(self.now);
         for (id, at) in std::mem::take(&mut self.lost) {
             let pose = Pose::from_translation(at.extend(TABLE_Z));
-            self.put(id, Place { support: None, pose, tolerance_m: 0.03 }, PlaceCause::Seen(FrameId(7)), now);
+            self.put(
+                id,
+                Place { support: None, pose, tolerance_m: 0.03, heading_tolerance_rad: None },
+                PlaceCause::Seen(FrameId(7)),
+                now,
+            );
         }
     }
     /// Somebody else takes an object away and puts it down before the eyes of the robot.
@@ -312,11 +393,14 @@ impl World {
             }
             "at" => match (entry?.presence, &literal.arguments[1]) {
                 (Presence::Present, Term::Place(place)) => {
+                    let turn = acm_concept::pose::wrap_angle(entry?.pose()?.yaw() - place.pose.yaw()).abs();
                     self.spot(entry?.id).distance(place.pose.translation.truncate()) <= place.tolerance_m
+                        && place.heading_tolerance_rad.is_none_or(|allowed| turn <= allowed)
                 }
                 (Presence::Held, _) => false,
                 _ => return None,
             },
+            other if self.visible.contains(other) => self.facts.contains(&literal.to_string()),
             _ => return None,
         })
     }
@@ -390,7 +474,8 @@ impl MemoryView for World {
         }
     }
     fn belief(&self, literal: &Literal) -> Belief {
-        let Some(holds) = self.truth(literal) else { return Belief::unknown("nothing is known of it") };
+        let positive = Literal { negated: false, ..literal.clone() };
+        let Some(holds) = self.truth(&positive) else { return Belief::unknown("nothing is known of it") };
         let truth = if holds != literal.negated { Truth::Yes } else { Truth::No };
         Belief { truth, confidence: 0.9, evidence: vec![Evidence::Frame(FrameId(0))], reason: "seen".into() }
     }
@@ -462,8 +547,8 @@ pub fn situation(world: &World, looks: u32) -> Situation {
             ..Feedback::default()
         },
         looks,
-        deadline: Time::from_seconds(600.0),
-        skills_left: 60,
+        deadline: Time::from_seconds(1200.0),
+        skills_left: 200,
     }
 }
 
@@ -471,7 +556,7 @@ pub fn options(on_unknown: OnUnknown, seed: u64) -> PlanOptions {
     PlanOptions { on_unknown, seed }
 }
 
-/// Runs a task to its end; `between` may change the world after each decision. More than 120 decisions fail.
+/// Runs a task to its end; `between` may change the world after each decision. More than 400 decisions fail.
 pub fn run(
     world: &mut World,
     task: &Task,
@@ -480,7 +565,7 @@ pub fn run(
 ) -> Decision {
     let planner = Planner::new().unwrap();
     let mut looks = 0;
-    for _ in 0..120 {
+    for _ in 0..400 {
         let decision = planner.decide(task, world, &situation(world, looks), options);
         looks = if matches!(decision, Decision::Look { .. }) { looks + 1 } else { 0 };
         match &decision {
@@ -499,5 +584,5 @@ pub fn run(
         }
         between(world, &decision);
     }
-    panic!("no end after 120 decisions: {:?}", world.done_skills);
+    panic!("no end after 400 decisions: {:?}", world.done_skills);
 }

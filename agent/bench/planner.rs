@@ -1,0 +1,52 @@
+//! `acm bench planner`: what the planner makes of published tasks.
+//!
+//! | module | measures |
+//! |---|---|
+//! | [`drawn`] | how long plans for thirty objects and forty steps take |
+//! | [`verdicts`] | what the verifier says of finished skills, beside what came of them in truth |
+//! | [`goals`] | goals of tabletop tasks and household activities that are reached, each plan simulated |
+//!
+//! [`published`] makes problems of published tasks; [`simulator`] follows plans.
+
+pub mod drawn;
+pub mod goals;
+pub mod published;
+pub mod simulator;
+pub mod verdicts;
+
+use super::BenchResult;
+use crate::cli::PlannerArgs;
+use clap::ValueEnum;
+
+/// A part of the bench.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum PlannerPart {
+    /// Goals of tabletop tasks and of household activities, given with what holds at first.
+    Goals,
+    /// Households of thirty objects that need forty steps, drawn at random.
+    Drawn,
+    /// What the verifier says of the skills of whole episodes, with and without things that slip.
+    Verdicts,
+}
+
+/// Measures the parts that are asked for, or everything.
+///
+/// # Errors
+/// None: a part that ends with an error is told in the result.
+pub fn measure(args: &PlannerArgs) -> anyhow::Result<BenchResult> {
+    let mut result = BenchResult::new("planner", "none");
+    let parts = if args.only.is_empty() { PlannerPart::value_variants() } else { &args.only };
+    for part in parts {
+        let measured = match part {
+            PlannerPart::Goals => goals::measure(&args.common, &mut result),
+            PlannerPart::Drawn => drawn::measure(&args.common, &mut result),
+            PlannerPart::Verdicts => verdicts::measure(&args.common, &mut result),
+        };
+        // What the other parts have measured is not lost with it.
+        if let Err(error) = measured {
+            let name = part.to_possible_value().map(|value| value.get_name().to_string()).unwrap_or_default();
+            result.errors.push(format!("{name}: {error:#}"));
+        }
+    }
+    Ok(result)
+}
