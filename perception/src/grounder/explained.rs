@@ -84,12 +84,13 @@ pub(super) fn find<'a>(scene: &Scene, context: Context<'a>, remembered: &'a Reme
     found
 }
 
-/// Whether most of what is visible of a thing is where memory expects it.
+/// Whether most of what is visible of a thing is where memory expects it. What was seen but a few times is measured anew,
+/// beginning from the evidence: begun from memory's sizes its views would agree with memory more than they tell.
 fn is_in_place(ghost: &Ghost) -> bool {
     let (agrees, differs) = ghost.agreement();
     !ghost.flat
         && !ghost.held
-        && ghost.views > 0
+        && ghost.known().is_some_and(|known| known.settled)
         && agrees as f64 > IN_PLACE * (agrees + differs) as f64
         && agrees >= CLAIM_PX
 }
