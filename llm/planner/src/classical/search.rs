@@ -70,7 +70,7 @@ impl Ord for Waiting {
 /// Looks for a plan: first with actions that begin a relaxed plan alone, then, if that leads nowhere, with all.
 /// Gives also how many states were looked at.
 pub(super) fn search(task: &Task, effort: &Effort<'_>) -> (Outcome, usize) {
-    let (outcome, looked_at) = pass(task, effort, effort.states / 2, true);
+    let (outcome, looked_at) = pass(task, effort, effort.states / 4, true);
     if matches!(outcome, Outcome::Found(_)) || (effort.expired)() {
         return (outcome, looked_at);
     }
