@@ -4,11 +4,13 @@
 //! |---|---|
 //! | [`drawn`] | how long plans for thirty objects and forty steps take |
 //! | [`goals`] | goals of tabletop tasks and household activities that are reached, each plan simulated |
+//! | [`peer`] | pyperplan on the same problems |
 //!
 //! [`published`] makes problems of published tasks; [`simulator`] follows plans.
 
 pub mod drawn;
 pub mod goals;
+pub mod peer;
 pub mod published;
 pub mod simulator;
 
@@ -23,6 +25,8 @@ pub enum PlannerPart {
     Goals,
     /// Households of thirty objects that need forty steps, drawn at random.
     Drawn,
+    /// pyperplan on the same goals (scripts/peers.sh installs it).
+    Peer,
 }
 
 /// Measures the parts that are asked for, or everything.
@@ -36,6 +40,7 @@ pub fn measure(args: &PlannerArgs) -> anyhow::Result<BenchResult> {
         let measured = match part {
             PlannerPart::Goals => goals::measure(&args.common, &mut result),
             PlannerPart::Drawn => drawn::measure(&args.common, &mut result),
+            PlannerPart::Peer => peer::measure(&args.common, &mut result),
         };
         // What the other parts have measured is not lost with it.
         if let Err(error) = measured {

@@ -92,7 +92,6 @@ pub enum NoPlan {
 pub fn plan(domain: &Domain, problem: &Problem, effort: &Effort<'_>) -> Result<Plan, NoPlan> {
     let instance = Instance::new(domain, problem)?;
     let task = Task::new(&instance)?;
-    eprintln!("TASK {} facts {} rules {} actions {}", task.facts.len(), task.derived.iter().filter(|d| **d).count(), task.inferences.len(), task.actions.len());
     let (outcome, looked_at) = search(&task, effort);
     let found = match outcome {
         Outcome::Found(found) => found,
