@@ -93,7 +93,8 @@ pub fn household() -> anyhow::Result<Result<Vec<Task>, String>> {
 }
 
 fn read(archive: &Path) -> anyhow::Result<Vec<(String, Problem)>> {
-    let short = |file: &str| file.trim_end_matches("problem0.bddl").trim_end_matches(".bddl").trim_matches('/').to_string();
+    let short =
+        |file: &str| file.trim_end_matches("problem0.bddl").trim_end_matches(".bddl").trim_matches('/').to_string();
     let parse = |(file, text): (String, String)| {
         let problem = Problem::parse(&text).with_context(|| format!("{file} of {}", archive.display()))?;
         Ok((short(&file), problem))
@@ -233,7 +234,8 @@ pub fn follow(task: &Task, calls: &[Call]) -> Result<(), String> {
 fn needless(task: &Task, plan: &Plan) -> usize {
     let calls = plan.calls();
     let without = |left_out: &usize| {
-        let rest: Vec<Call> = calls.iter().enumerate().filter(|(at, _)| at != left_out).map(|(_, call)| call.clone()).collect();
+        let rest: Vec<Call> =
+            calls.iter().enumerate().filter(|(at, _)| at != left_out).map(|(_, call)| call.clone()).collect();
         follow(task, &rest).is_ok()
     };
     (0..calls.len()).filter(without).count()

@@ -65,7 +65,8 @@ pub fn measure(args: &BenchArgs, result: &mut BenchResult) -> anyhow::Result<()>
             too_derived += 1;
             continue;
         };
-        let (plan, seconds) = cpu_s(|| plan(&domain, &task.problem, &Effort::default())).with_context(|| task.name.clone())?;
+        let (plan, seconds) =
+            cpu_s(|| plan(&domain, &task.problem, &Effort::default())).with_context(|| task.name.clone())?;
         let name = format!("{number:04}");
         std::fs::write(folder.path().join(format!("{name}.domain.pddl")), &export.domain)?;
         std::fs::write(folder.path().join(format!("{name}.problem.pddl")), &export.problem)?;
@@ -80,7 +81,9 @@ pub fn measure(args: &BenchArgs, result: &mut BenchResult) -> anyhow::Result<()>
     };
     let (mut ratios, mut steps, mut peer_steps, mut unsolved, mut refused) = (Vec::new(), 0, 0, 0, 0);
     for answer in &answers {
-        let Some(ours) = handed.get(&answer.name) else { bail!("the peer answers for `{}`, which nobody asked", answer.name) };
+        let Some(ours) = handed.get(&answer.name) else {
+            bail!("the peer answers for `{}`, which nobody asked", answer.name)
+        };
         let Some(actions) = &answer.actions else {
             unsolved += 1;
             continue;
@@ -132,7 +135,8 @@ fn ask(folder: &std::path::Path, problems: usize) -> anyhow::Result<(String, Vec
         let last = words.lines().rev().find(|line| !line.trim().is_empty()).unwrap_or("it ended without a word");
         bail!("no peer by {}: {last} (scripts/peers.sh installs it)", python.display());
     };
-    let first: BTreeMap<String, String> = serde_json::from_str(&first?).context("the peer's first line is not understood")?;
+    let first: BTreeMap<String, String> =
+        serde_json::from_str(&first?).context("the peer's first line is not understood")?;
     let mut answers = Vec::new();
     for line in lines {
         answers.push(serde_json::from_str(&line?).context("the peer's answer is not understood")?);

@@ -212,7 +212,8 @@ impl Draft {
             }
         }
         for kinds in self.objects.values_mut() {
-            let new = able.iter().filter(|(of_type, _)| kinds.contains(of_type)).map(|(_, ability)| ability.to_string());
+            let new =
+                able.iter().filter(|(of_type, _)| kinds.contains(of_type)).map(|(_, ability)| ability.to_string());
             kinds.extend(new.collect::<Vec<_>>());
         }
     }

@@ -146,8 +146,13 @@ impl World {
             return Err(format!("{above} stands on {thing}"));
         }
         // What is in it goes with it; what either of them was near or under it leaves behind.
-        let moved: BTreeSet<String> =
-            self.at.keys().filter(|inner| *inner == thing || self.is_in(inner, thing)).cloned().chain([thing.to_string()]).collect();
+        let moved: BTreeSet<String> = self
+            .at
+            .keys()
+            .filter(|inner| *inner == thing || self.is_in(inner, thing))
+            .cloned()
+            .chain([thing.to_string()])
+            .collect();
         let stays = |pair: &(String, String)| moved.contains(&pair.0) == moved.contains(&pair.1);
         self.near.retain(stays);
         self.under.retain(stays);
@@ -195,7 +200,8 @@ impl World {
     fn evaluate(&self, goal: &Expression, bound: &BTreeMap<String, String>) -> Result<bool, String> {
         let Some((head, rest)) = goal.headed() else { return Err(format!("no condition: {goal}")) };
         let head = head.to_ascii_lowercase();
-        let each = |rest: &[Expression]| rest.iter().map(|part| self.evaluate(part, bound)).collect::<Result<Vec<_>, _>>();
+        let each =
+            |rest: &[Expression]| rest.iter().map(|part| self.evaluate(part, bound)).collect::<Result<Vec<_>, _>>();
         let over = |variable: &Expression, body: &Expression| -> Result<Vec<bool>, String> {
             let (name, members) = self.members(variable)?;
             let with = |member: &String| {

@@ -142,7 +142,9 @@ fn limits_end_a_search_and_broken_problems_are_told() {
     assert!(matches!(plan(&domain, &question, &short), Err(NoPlan::GivenUp { .. })));
     let late = Effort { expired: &|| true, ..Effort::default() };
     assert!(matches!(plan(&domain, &question, &late), Err(NoPlan::GivenUp { .. })));
-    let error = |init: &[&str], goal: &str| plan(&domain, &problem(KITCHEN, init, goal), &Effort::default()).unwrap_err().to_string();
+    let error = |init: &[&str], goal: &str| {
+        plan(&domain, &problem(KITCHEN, init, goal), &Effort::default()).unwrap_err().to_string()
+    };
     assert!(error(&[], "(on jug table)").contains("names `jug`"));
     assert!(error(&[], "(on ?x table)").contains("?x in on(?x, table)"));
     assert!(error(&["(on cup)"], "(on cup table)").contains("1 arguments; 2 are expected"));
@@ -152,7 +154,11 @@ fn limits_end_a_search_and_broken_problems_are_told() {
 /// A household drawn at random: where each thing is, which of the containers are open, and what is wanted.
 fn households() -> impl Strategy<Value = Problem> {
     let place = (0..7_usize, any::<bool>());
-    (proptest::collection::vec(place, 5), proptest::collection::vec((0..5_usize, 0..9_usize, any::<bool>()), 1..4), any::<[bool; 2]>())
+    (
+        proptest::collection::vec(place, 5),
+        proptest::collection::vec((0..5_usize, 0..9_usize, any::<bool>()), 1..4),
+        any::<[bool; 2]>(),
+    )
         .prop_map(|(places, wanted, open)| {
             let kinds = |list: &str| list.split_whitespace().map(str::to_string).collect();
             let things = ["cup", "mug", "tray", "box", "bag"];
@@ -174,11 +180,16 @@ fn households() -> impl Strategy<Value = Problem> {
             let mut init = vec![Literal::new("hand-empty", Vec::new())];
             for (number, (place, inside)) in places.iter().enumerate() {
                 // Later things may be on or in earlier ones, so that nothing is in itself.
-                let possible: Vec<&str> = ["table", "shelf", "fridge"].into_iter().chain(things[..number].iter().copied()).collect();
+                let possible: Vec<&str> =
+                    ["table", "shelf", "fridge"].into_iter().chain(things[..number].iter().copied()).collect();
                 let support = possible[place % possible.len()];
                 let container = ["fridge", "box", "bag"].contains(&support);
                 let predicate = if container && *inside { "inside" } else { "on" };
-                init.push(two(predicate, things[number], if predicate == "on" && support == "bag" { "table" } else { support }));
+                init.push(two(
+                    predicate,
+                    things[number],
+                    if predicate == "on" && support == "bag" { "table" } else { support },
+                ));
             }
             let opened = ["fridge", "box"].into_iter().zip(open).filter(|(_, open)| *open);
             init.extend(opened.map(|(name, _)| Literal::new("open", vec![Term::Symbol(name.into())])));

@@ -237,7 +237,9 @@ impl<'d> Check<'d> {
         }
         let first = *arities.entry(literal.predicate.clone()).or_insert(arity);
         if first != arity {
-            return Err(self.error(format!("{literal} has {arity} arguments, elsewhere `{}` has {first}", literal.predicate)));
+            return Err(
+                self.error(format!("{literal} has {arity} arguments, elsewhere `{}` has {first}", literal.predicate))
+            );
         }
         Ok(())
     }
@@ -345,7 +347,10 @@ mod tests {
             (operator("(and)", "(far ?self)"), "is derived and cannot be an effect"),
             (operator("(and)", "(or (moved ?self))"), "an effect is made of literals"),
             (operator("(not)", "(moved ?self)"), "precondition of `push`: line 1: `not` has 0 arguments"),
-            (operator("(and)", "(moved ?self)").replace("(gone ?a)", "(not (far ?a))"), "must not be negated in a rule"),
+            (
+                operator("(and)", "(moved ?self)").replace("(gone ?a)", "(not (far ?a))"),
+                "must not be negated in a rule",
+            ),
             ("[[operator]]\nnam = 'x'".into(), "cannot be understood"),
         ] {
             let error = Domain::parse(&text).unwrap_err().to_string();

@@ -107,9 +107,7 @@ impl Formula {
             Formula::Implies(both) => Formula::Implies(Box::new((both.0.map(change)?, both.1.map(change)?))),
             Formula::ForAll(variable, body) => Formula::ForAll(variable.clone(), Box::new(body.map(change)?)),
             Formula::Exists(variable, body) => Formula::Exists(variable.clone(), Box::new(body.map(change)?)),
-            Formula::Exactly(n, variable, body) => {
-                Formula::Exactly(*n, variable.clone(), Box::new(body.map(change)?))
-            }
+            Formula::Exactly(n, variable, body) => Formula::Exactly(*n, variable.clone(), Box::new(body.map(change)?)),
             Formula::Pairs(n, first, second, body) => {
                 Formula::Pairs(*n, first.clone(), second.clone(), Box::new(body.map(change)?))
             }

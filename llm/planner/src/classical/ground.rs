@@ -66,7 +66,8 @@ impl Task {
             return state;
         }
         let triggered = |fact: &usize| state.contains(*fact);
-        let mut open: Vec<u32> = (0..self.facts.len()).filter(triggered).flat_map(|fact| &self.triggered[fact]).copied().collect();
+        let mut open: Vec<u32> =
+            (0..self.facts.len()).filter(triggered).flat_map(|fact| &self.triggered[fact]).copied().collect();
         open.extend(&self.untriggered);
         loop {
             let before = open.len();
@@ -195,7 +196,9 @@ impl<'i> Grounder<'i> {
 
     /// Whether an atom can ever hold, as far as its predicate and its arguments tell.
     fn possible(&self, wanted: &Atom) -> bool {
-        let fits = |lists: &Vec<BTreeSet<u16>>| lists.iter().zip(wanted.arguments).all(|(list, object)| list.contains(&object));
+        let fits = |lists: &Vec<BTreeSet<u16>>| {
+            lists.iter().zip(wanted.arguments).all(|(list, object)| list.contains(&object))
+        };
         match self.instance.origin(wanted.predicate) {
             Origin::Static => self.instance.init.contains(wanted),
             Origin::Fluent => {
@@ -363,7 +366,8 @@ fn reachable(
         // Of derived facts only that they can hold is followed up.
         reached[Lit::new(number, true).index()] = !at_first || derived[number];
     }
-    let (mut waiting, mut unmet): (Vec<&Action>, Vec<&Inference>) = (actions.iter().collect(), inferences.iter().collect());
+    let (mut waiting, mut unmet): (Vec<&Action>, Vec<&Inference>) =
+        (actions.iter().collect(), inferences.iter().collect());
     loop {
         let before = waiting.len() + unmet.len();
         waiting.retain(|action| {
@@ -450,5 +454,14 @@ fn renumber(
             None => untriggered.push(number),
         }
     }
-    Task { facts, derived, inferences, actions, goal: goal.map(&|old| Node::Literal(lit(old))), init, triggered, untriggered }
+    Task {
+        facts,
+        derived,
+        inferences,
+        actions,
+        goal: goal.map(&|old| Node::Literal(lit(old))),
+        init,
+        triggered,
+        untriggered,
+    }
 }

@@ -223,17 +223,20 @@ impl<'p> Names<'p> {
     }
     fn atom(&mut self, literal: &Literal, scope: &[&str]) -> Result<(u16, Vec<Slot>), ProblemError> {
         let predicate = self.predicate(&literal.predicate, literal.arguments.len(), &literal.to_string())?;
-        let slot = |term: &Term| match term {
-            Term::Variable(name) => scope.iter().rposition(|known| known == name).map(Slot::Variable).ok_or_else(|| {
-                ProblemError::Unbound { literal: literal.to_string(), variable: name.clone() }
-            }),
-            other => {
-                let name = name_of(other);
-                self.numbers.get(name.as_str()).copied().map(Slot::Object).ok_or_else(|| {
-                    ProblemError::UnknownObject { literal: literal.to_string(), object: name.clone() }
-                })
-            }
-        };
+        let slot =
+            |term: &Term| match term {
+                Term::Variable(name) => scope
+                    .iter()
+                    .rposition(|known| known == name)
+                    .map(Slot::Variable)
+                    .ok_or_else(|| ProblemError::Unbound { literal: literal.to_string(), variable: name.clone() }),
+                other => {
+                    let name = name_of(other);
+                    self.numbers.get(name.as_str()).copied().map(Slot::Object).ok_or_else(|| {
+                        ProblemError::UnknownObject { literal: literal.to_string(), object: name.clone() }
+                    })
+                }
+            };
         Ok((predicate, literal.arguments.iter().map(slot).collect::<Result<_, _>>()?))
     }
     fn condition<'f>(&mut self, formula: &'f Formula, scope: &mut Vec<&'f str>) -> Result<Condition, ProblemError> {

@@ -93,7 +93,9 @@ pub fn export(domain: &Domain, problem: &Problem) -> Result<Export, ExportError>
             let name = format!("do-{}-{}", actions.len(), plain(&step.to_string()));
             let mut needs: Vec<String> = case.iter().map(|lit| names.of(*lit)).collect();
             needs.push("is-going-on".into());
-            let of = |facts: &[u32], negated| facts.iter().map(|fact| Lit::new(*fact as usize, negated)).collect::<Vec<Lit>>();
+            let of = |facts: &[u32], negated| {
+                facts.iter().map(|fact| Lit::new(*fact as usize, negated)).collect::<Vec<Lit>>()
+            };
             let made = [of(&action.add, false), of(&action.delete, true)].concat();
             let written = |lit: &&Lit| !lit.negated() || denied.contains(&lit.fact());
             let adds = made.iter().filter(written).map(|lit| names.of(*lit)).collect();
@@ -104,7 +106,12 @@ pub fn export(domain: &Domain, problem: &Problem) -> Result<Export, ExportError>
         }
     }
     let going_on = vec!["is-going-on".to_string()];
-    actions.push(Written { name: "finish".into(), needs: going_on.clone(), adds: vec!["is-finished".into()], deletes: going_on });
+    actions.push(Written {
+        name: "finish".into(),
+        needs: going_on.clone(),
+        adds: vec!["is-finished".into()],
+        deletes: going_on,
+    });
     for (part, cases) in parts_cases.iter().enumerate() {
         for (number, case) in cases.iter().enumerate() {
             let needs = case.iter().map(|lit| names.of(*lit)).chain(["is-finished".to_string()]).collect();
@@ -116,7 +123,8 @@ pub fn export(domain: &Domain, problem: &Problem) -> Result<Export, ExportError>
     let at_first: Vec<Lit> = facts.map(|fact| Lit::new(fact, !task.init.contains(fact))).collect();
     let at_first = at_first.into_iter().filter(|lit| !lit.negated() || denied.contains(&lit.fact()));
     let init: Vec<String> = at_first.map(|lit| names.of(lit)).chain(["is-going-on".to_string()]).collect();
-    let goal: Vec<String> = (0..parts.len()).map(|part| format!("is-reached-{part}")).chain(["is-finished".into()]).collect();
+    let goal: Vec<String> =
+        (0..parts.len()).map(|part| format!("is-reached-{part}")).chain(["is-finished".into()]).collect();
     Ok(Export { domain: write_domain(&actions, &init, &goal), problem: write_problem(&init, &goal), calls })
 }
 
@@ -134,7 +142,8 @@ impl Names<'_> {
 
 /// The text as a name of PDDL.
 fn plain(text: &str) -> String {
-    let words: Vec<&str> = text.split(|c: char| !c.is_ascii_alphanumeric() && c != '_').filter(|w| !w.is_empty()).collect();
+    let words: Vec<&str> =
+        text.split(|c: char| !c.is_ascii_alphanumeric() && c != '_').filter(|w| !w.is_empty()).collect();
     words.join("-").to_ascii_lowercase()
 }
 
@@ -145,7 +154,8 @@ fn unfold(task: &Task, node: &Node) -> Option<Node> {
 }
 
 fn unfold_within(task: &Task, node: &Node, above: &mut Vec<usize>, left: &mut usize) -> Option<Node> {
-    let mut each = |list: &[Node]| list.iter().map(|node| unfold_within(task, node, above, left)).collect::<Option<Vec<_>>>();
+    let mut each =
+        |list: &[Node]| list.iter().map(|node| unfold_within(task, node, above, left)).collect::<Option<Vec<_>>>();
     match node {
         Node::All(list) => Some(Node::all(each(list)?)),
         Node::Any(list) => Some(Node::any(each(list)?)),

@@ -117,7 +117,8 @@ impl Problem {
     /// What a step costs: one, and more the less often it succeeds: the negative logarithm of the expected share of
     /// successes, (successes + 1) / (tries + 2), as skill memory has it.
     pub fn cost(&self, call: &Call) -> f64 {
-        let tried = call.arguments.first().and_then(|first| self.experience.get(&(call.operator.clone(), first.clone())));
+        let tried =
+            call.arguments.first().and_then(|first| self.experience.get(&(call.operator.clone(), first.clone())));
         match tried {
             Some(Tries { tries, successes }) => {
                 1.0 - (f64::from(successes + 1) / f64::from(tries.max(successes) + 2)).ln()

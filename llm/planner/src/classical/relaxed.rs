@@ -96,7 +96,9 @@ impl<'t> Heuristic<'t> {
                 supporter.needs.iter().for_each(|need| needing[*need as usize].push(number));
             }
             if supporter.action.is_some() {
-                let give = |given: &u32| cheapest_action[*given as usize] = cheapest_action[*given as usize].min(supporter.cost);
+                let give = |given: &u32| {
+                    cheapest_action[*given as usize] = cheapest_action[*given as usize].min(supporter.cost)
+                };
                 supporter.gives.iter().for_each(give);
             }
         }
@@ -170,7 +172,13 @@ impl<'t> Heuristic<'t> {
     }
 
     /// Tells those who need a proposition what it costs.
-    fn pass_on(&mut self, proposition: u32, cost: f64, supported: &mut [f64], open: &mut BinaryHeap<Reverse<(u64, u32)>>) {
+    fn pass_on(
+        &mut self,
+        proposition: u32,
+        cost: f64,
+        supported: &mut [f64],
+        open: &mut BinaryHeap<Reverse<(u64, u32)>>,
+    ) {
         for at in 0..self.needing[proposition as usize].len() {
             let number = self.needing[proposition as usize][at];
             supported[number as usize] += cost;

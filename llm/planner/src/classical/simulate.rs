@@ -245,7 +245,8 @@ impl World<'_> {
             Condition::Exists(members, body) => example("one".into(), first(members), body),
             Condition::Exactly(n, members, body) => example(format!("exactly {n}"), first(members), body),
             Condition::Pairs(n, rows, columns, body) => {
-                let pair = rows.first().and_then(|row| Some(vec![*row, *columns.iter().find(|column| *column != row)?]));
+                let pair =
+                    rows.first().and_then(|row| Some(vec![*row, *columns.iter().find(|column| *column != row)?]));
                 example(format!("{n} pairs"), pair, body)
             }
         }
