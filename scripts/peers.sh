@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Installs what `acm bench world` compares with, in a Python environment of its own. Nothing else needs it; without it
+# Installs what `acm bench world` and `acm bench planner` compare with, in a Python environment of its own. Nothing else needs it; without it
 # those rows say that they are skipped.
 set -euo pipefail
 cd "$(dirname "$0")/.."

@@ -5,11 +5,13 @@
 //! | [`drawn`] | how long plans for thirty objects and forty steps take |
 //! | [`verdicts`] | what the verifier says of finished skills, beside what came of them in truth |
 //! | [`goals`] | goals of tabletop tasks and household activities that are reached, each plan simulated |
+//! | [`peer`] | pyperplan on the same problems |
 //!
 //! [`published`] makes problems of published tasks; [`simulator`] follows plans.
 
 pub mod drawn;
 pub mod goals;
+pub mod peer;
 pub mod published;
 pub mod simulator;
 pub mod verdicts;
@@ -27,6 +29,8 @@ pub enum PlannerPart {
     Drawn,
     /// What the verifier says of the skills of whole episodes, with and without things that slip.
     Verdicts,
+    /// pyperplan on the same goals (scripts/peers.sh installs it).
+    Peer,
 }
 
 /// Measures the parts that are asked for, or everything.
@@ -41,6 +45,7 @@ pub fn measure(args: &PlannerArgs) -> anyhow::Result<BenchResult> {
             PlannerPart::Goals => goals::measure(&args.common, &mut result),
             PlannerPart::Drawn => drawn::measure(&args.common, &mut result),
             PlannerPart::Verdicts => verdicts::measure(&args.common, &mut result),
+            PlannerPart::Peer => peer::measure(&args.common, &mut result),
         };
         // What the other parts have measured is not lost with it.
         if let Err(error) = measured {

@@ -219,6 +219,9 @@ pub fn follow(task: &Task, calls: &[Call]) -> Result<(), String> {
         let things: Vec<&str> = call.arguments.iter().map(String::as_str).collect();
         world.act(&call.operator, &things).map_err(|refusal| format!("step {number}, {call}: {refusal}"))?;
     }
+    if let Some(held) = world.held() {
+        return Err(format!("after {} steps the hand still holds {held}", calls.len()));
+    }
     for goal in task.source.section("goal") {
         if !world.holds(goal)? {
             return Err(format!("after {} steps this does not hold: {goal}", calls.len()));

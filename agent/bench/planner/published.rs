@@ -217,8 +217,11 @@ impl Draft {
             kinds.extend(new.collect::<Vec<_>>());
         }
     }
+    /// The task, in which nothing stays in the hand: what shall not be here is put elsewhere.
     fn task(self, name: &str, source: bddl::Problem) -> Task {
-        Task { name: name.into(), source, problem: Problem::new(self.objects, self.init, self.goal) }
+        let put_down = Formula::Literal(Literal::new("hand-empty", Vec::new()));
+        let goal = Formula::All(vec![self.goal, put_down]);
+        Task { name: name.into(), source, problem: Problem::new(self.objects, self.init, goal) }
     }
 }
 

@@ -185,6 +185,10 @@ impl World {
         if direct || of_one_room { Ok(()) } else { Err(format!("{place} is not where {other} is")) }
     }
 
+    /// What the hand holds.
+    pub fn held(&self) -> Option<&str> {
+        self.hand.as_deref()
+    }
     /// Whether a published goal holds.
     ///
     /// # Errors

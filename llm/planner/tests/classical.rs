@@ -88,12 +88,12 @@ fn quantified_goals_are_reached() {
         ("(exists (?cup - cup) (on ?cup shelf))", 2),
         ("(forn (1) (?cup - cup) (on ?cup tray))", 0),
         ("(forn (2) (?cup - cup) (on ?cup tray))", 4),
-        ("(forn (0) (?cup - cup) (on ?cup tray))", 2),
+        ("(forn (0) (?cup - cup) (on ?cup tray))", 1),
         ("(forpairs (?cup - cup) (?place - fixed) (on ?cup ?place))", 6),
         ("(fornpairs (1) (?cup - cup) (?place - fixed) (on ?cup ?place))", 2),
         ("(imply (on cup tray) (turned-on lamp))", 1),
         ("(or (on mug table) (next-to cup mug) (turned-on lamp))", 1),
-        ("(not (exists (?cup - cup) (within ?cup fridge)))", 4),
+        ("(not (exists (?cup - cup) (within ?cup fridge)))", 2),
     ] {
         let found = solve(&problem(KITCHEN, AT_FIRST, goal));
         assert_eq!(found.steps.len(), number, "{goal}:\n{found}");

@@ -3,6 +3,9 @@
 //! Each literal's cost is the sum of what its cheapest supporter needs (h-add); the relaxed plan takes those supporters,
 //! each once (h-FF). A derived fact is supported by an inference that costs nothing. That a derived fact does not hold is
 //! supported by breaking every inference that makes it hold now.
+//!
+//! A part of the goal that holds now, but that the relaxed plan undoes on its way, must be brought about again: the cheapest
+//! action that does so is added. Without it a lid would be closed too early as gladly as in time.
 
 use super::{
     ground::Task,
@@ -35,12 +38,18 @@ pub(super) struct Heuristic<'t> {
     task: &'t Task,
     supporters: Vec<Supporter>,
     needing: Vec<Vec<u32>>,
-    /// Supporters of "this derived fact does not hold", by fact.
+    /// The supporter of "this derived fact does not hold", by fact.
     denials: Vec<u32>,
+    /// The first of the supporters of "this inference is broken", one for each part of its body.
+    breakers: Vec<u32>,
     inferences_of: Vec<Vec<u32>>,
+    /// The cost of the cheapest action that makes a literal hold.
+    cheapest_action: Vec<f64>,
     unmet: Vec<u32>,
     costs: Vec<f64>,
     chosen: Vec<u32>,
+    /// In this state: breakers that wait for a literal.
+    watching: Vec<Vec<u32>>,
 }
 
 impl<'t> Heuristic<'t> {
@@ -59,10 +68,12 @@ impl<'t> Heuristic<'t> {
             });
         }
         let mut inferences_of = vec![Vec::new(); task.facts.len()];
+        let mut breakers = Vec::new();
         for (number, inference) in task.inferences.iter().enumerate() {
             let head = Lit::new(inference.head as usize, false).0;
             let needs = inference.body.iter().map(|lit| lit.0).collect();
             supporters.push(Supporter { needs, gives: vec![head], cost: 0.0, action: None });
+            breakers.push(supporters.len() as u32);
             for lit in &inference.body {
                 let needs = vec![lit.negate().0];
                 supporters.push(Supporter { needs, gives: vec![broken(number)], cost: 0.0, action: None });
@@ -77,18 +88,32 @@ impl<'t> Heuristic<'t> {
         }
         let propositions = literals + task.inferences.len();
         let mut needing = vec![Vec::new(); propositions];
+        let mut cheapest_action = vec![f64::INFINITY; propositions];
         for (number, supporter) in (0..).zip(&supporters) {
-            supporter.needs.iter().for_each(|need| needing[*need as usize].push(number));
+            // Breakers are asked only where the inference holds.
+            let breaker = supporter.gives.iter().all(|given| *given as usize >= literals);
+            if !breaker {
+                supporter.needs.iter().for_each(|need| needing[*need as usize].push(number));
+            }
+            if supporter.action.is_some() {
+                let give = |given: &u32| {
+                    cheapest_action[*given as usize] = cheapest_action[*given as usize].min(supporter.cost)
+                };
+                supporter.gives.iter().for_each(give);
+            }
         }
         Heuristic {
             task,
             unmet: vec![0; supporters.len()],
             costs: vec![f64::INFINITY; propositions],
             chosen: vec![NOBODY; propositions],
+            watching: vec![Vec::new(); literals],
             supporters,
             needing,
             denials,
+            breakers,
             inferences_of,
+            cheapest_action,
         }
     }
 
@@ -105,44 +130,66 @@ impl<'t> Heuristic<'t> {
     fn spread(&mut self, state: &State) {
         self.costs.fill(f64::INFINITY);
         self.chosen.fill(NOBODY);
-        let mut supported = vec![0.0; self.supporters.len()];
-        let mut open = BinaryHeap::new();
+        self.watching.iter_mut().for_each(Vec::clear);
         for (unmet, supporter) in self.unmet.iter_mut().zip(&self.supporters) {
             *unmet = supporter.needs.len() as u32;
         }
+        let mut supported = vec![0.0; self.supporters.len()];
+        let mut open = BinaryHeap::new();
+        let literals = self.task.facts.len() * 2;
+        let mut at_once: Vec<u32> = Vec::new();
+        for fact in 0..self.task.facts.len() {
+            at_once.push(Lit::new(fact, !state.contains(fact)).0);
+            // Only the inferences that make it hold now stand in the way of its denial.
+            if self.denials[fact] != NOBODY && state.contains(fact) {
+                for inference in &self.inferences_of[fact] {
+                    let body = &self.task.inferences[*inference as usize].body;
+                    if body.iter().all(|lit| state.holds(*lit)) {
+                        for (breaker, lit) in (self.breakers[*inference as usize]..).zip(body) {
+                            self.watching[lit.negate().index()].push(breaker);
+                        }
+                    } else {
+                        at_once.push(literals as u32 + inference);
+                    }
+                }
+            }
+        }
+        at_once.iter().for_each(|proposition| self.costs[*proposition as usize] = 0.0);
         for number in 0..self.supporters.len() {
             if self.unmet[number] == 0 {
                 self.support(number as u32, 0.0, &mut open);
             }
         }
-        for fact in 0..self.task.facts.len() {
-            let lit = Lit::new(fact, !state.contains(fact));
-            self.costs[lit.index()] = 0.0;
-            open.push(Reverse((0_u64, lit.0)));
-            // Only the inferences that make it hold now stand in the way of its denial.
-            if self.denials[fact] != NOBODY && state.contains(fact) {
-                for inference in self.inferences_of[fact].clone() {
-                    let broken = !self.task.inferences[inference as usize].body.iter().all(|lit| state.holds(*lit));
-                    if broken {
-                        let proposition = (self.task.facts.len() * 2) as u32 + inference;
-                        self.costs[proposition as usize] = 0.0;
-                        open.push(Reverse((0, proposition)));
-                    }
-                }
-            }
+        for proposition in at_once {
+            self.pass_on(proposition, 0.0, &mut supported, &mut open);
         }
         while let Some(Reverse((cost, proposition))) = open.pop() {
             let cost = f64::from_bits(cost);
-            if cost > self.costs[proposition as usize] {
-                continue;
+            if cost <= self.costs[proposition as usize] {
+                self.pass_on(proposition, cost, &mut supported, &mut open);
             }
-            for at in 0..self.needing[proposition as usize].len() {
-                let number = self.needing[proposition as usize][at];
-                supported[number as usize] += cost;
-                self.unmet[number as usize] -= 1;
-                if self.unmet[number as usize] == 0 {
-                    self.support(number, supported[number as usize], &mut open);
-                }
+        }
+    }
+
+    /// Tells those who need a proposition what it costs.
+    fn pass_on(
+        &mut self,
+        proposition: u32,
+        cost: f64,
+        supported: &mut [f64],
+        open: &mut BinaryHeap<Reverse<(u64, u32)>>,
+    ) {
+        for at in 0..self.needing[proposition as usize].len() {
+            let number = self.needing[proposition as usize][at];
+            supported[number as usize] += cost;
+            self.unmet[number as usize] -= 1;
+            if self.unmet[number as usize] == 0 {
+                self.support(number, supported[number as usize], open);
+            }
+        }
+        if let Some(watching) = self.watching.get_mut(proposition as usize) {
+            for breaker in std::mem::take(watching) {
+                self.support(breaker, cost, open);
             }
         }
     }
@@ -193,10 +240,12 @@ impl<'t> Heuristic<'t> {
     }
 
     fn relaxed_plan(&self, state: &State) -> Estimate {
-        let mut open = Vec::new();
-        self.choose(&self.task.goal, &mut open);
+        let mut goal = Vec::new();
+        self.choose(&self.task.goal, &mut goal);
+        let mut open = goal.clone();
         let mut seen = vec![false; self.costs.len()];
         let mut used = vec![false; self.supporters.len()];
+        let mut undone = vec![false; self.task.facts.len() * 2];
         let (mut cost, mut helpful) = (0.0, Vec::new());
         while let Some(proposition) = open.pop() {
             let number = self.chosen[proposition as usize];
@@ -207,6 +256,7 @@ impl<'t> Heuristic<'t> {
             if !std::mem::replace(&mut used[number as usize], true) {
                 cost += supporter.cost;
                 if let Some(action) = supporter.action {
+                    supporter.gives.iter().for_each(|given| undone[Lit(*given).negate().index()] = true);
                     if self.task.actions[action as usize].precondition.iter().all(|lit| state.holds(*lit)) {
                         helpful.push(action);
                     }
@@ -214,7 +264,32 @@ impl<'t> Heuristic<'t> {
             }
             open.extend(&supporter.needs);
         }
+        let mut standing = Vec::new();
+        goal.into_iter().for_each(|lit| self.ground_of(Lit(lit), state, &mut standing));
+        standing.sort_unstable();
+        standing.dedup();
+        let again = standing.into_iter().filter(|lit| undone[lit.index()]).map(|lit| self.cheapest_action[lit.index()]);
+        cost += again.filter(|cost| cost.is_finite()).sum::<f64>();
         helpful.sort_unstable();
         Estimate { cost, helpful }
+    }
+
+    /// The literal if it holds, or what it is derived from.
+    fn ground_of(&self, lit: Lit, state: &State, found: &mut Vec<Lit>) {
+        if !state.holds(lit) {
+            return;
+        }
+        if !self.task.derived[lit.fact()] {
+            found.push(lit);
+            return;
+        }
+        let inferences = self.inferences_of[lit.fact()].iter().map(|number| &self.task.inferences[*number as usize]);
+        let holding = inferences.into_iter().find(|inference| inference.body.iter().all(|need| state.holds(*need)));
+        // What follows round about from itself is not looked into: only what it follows from directly.
+        for need in holding.filter(|_| !lit.negated()).into_iter().flat_map(|inference| &inference.body) {
+            if !self.task.derived[need.fact()] {
+                found.push(*need);
+            }
+        }
     }
 }

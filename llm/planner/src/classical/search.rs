@@ -10,6 +10,9 @@ use std::{
     collections::{BinaryHeap, HashMap, hash_map::Entry},
 };
 
+/// States that a way of searching looks at before it is the other's turn.
+const TURN: usize = 1000;
+
 /// What a search may use, and how greedy it is.
 #[derive(Clone, Copy)]
 pub struct Effort<'c> {
@@ -67,46 +70,34 @@ impl Ord for Waiting {
     }
 }
 
-/// Looks for a plan: first with actions that begin a relaxed plan alone, then, if that leads nowhere, with all.
-/// Gives also how many states were looked at.
+/// Looks for a plan in two ways by turns: with actions that begin a relaxed plan alone, which is fast but may lead
+/// nowhere, and with all. Gives also how many states were looked at.
 pub(super) fn search(task: &Task, effort: &Effort<'_>) -> (Outcome, usize) {
-    let (outcome, looked_at) = pass(task, effort, effort.states / 2, true);
-    if matches!(outcome, Outcome::Found(_)) || (effort.expired)() {
-        return (outcome, looked_at);
-    }
-    let (outcome, more) = pass(task, effort, effort.states.saturating_sub(looked_at), false);
-    (outcome, looked_at + more)
-}
-
-fn pass(task: &Task, effort: &Effort<'_>, states: usize, only_helpful: bool) -> (Outcome, usize) {
-    let mut frontier = Frontier::new(task, effort.greed);
-    frontier.visit(task.init.clone(), None, 0.0);
-    let all: Vec<u32> = (0..task.actions.len() as u32).collect();
-    while let Some(next) = frontier.open.pop() {
-        let here = &frontier.reached[next.number as usize];
-        let (state, cost) = (here.state.clone(), here.cost);
-        let full = task.with_derived(&state);
-        if task.goal.holds(&full) {
-            return (Outcome::Found(way_to(next.number, &frontier.reached)), frontier.looked_at);
-        }
-        let actions = if only_helpful { here.helpful.clone() } else { all.clone() };
-        for number in actions {
-            let action = &task.actions[number as usize];
-            if applicable(action, &full) {
-                frontier.visit(task.after(&state, action), Some((next.number, number)), cost + action.cost);
+    let mut ways = [Frontier::new(task, effort.greed, true), Frontier::new(task, effort.greed, false)];
+    loop {
+        for way in 0..ways.len() {
+            let looked_at = |ways: &[Frontier<'_>]| ways.iter().map(|way| way.looked_at).sum::<usize>();
+            let left = effort.states.saturating_sub(looked_at(&ways));
+            let outcome = ways[way].go_on(left.min(TURN), effort.expired);
+            let capped = outcome == Outcome::Capped && ((effort.expired)() || looked_at(&ways) >= effort.states);
+            let ended = match outcome {
+                Outcome::Found(_) => true,
+                // That a part of the actions leads nowhere says nothing.
+                Outcome::Exhausted => !ways[way].only_helpful,
+                Outcome::Capped => capped,
+            };
+            if ended {
+                return (outcome, looked_at(&ways));
             }
         }
-        if frontier.looked_at >= states || (effort.expired)() {
-            return (Outcome::Capped, frontier.looked_at);
-        }
     }
-    (Outcome::Exhausted, frontier.looked_at)
 }
 
 /// The states that were reached and those that wait.
 struct Frontier<'t> {
     task: &'t Task,
     greed: f64,
+    only_helpful: bool,
     heuristic: Heuristic<'t>,
     /// The cost of the cheapest known way to a state.
     known: HashMap<State, f64>,
@@ -116,10 +107,36 @@ struct Frontier<'t> {
 }
 
 impl<'t> Frontier<'t> {
-    fn new(task: &'t Task, greed: f64) -> Frontier<'t> {
+    fn new(task: &'t Task, greed: f64, only_helpful: bool) -> Frontier<'t> {
         let heuristic = Heuristic::new(task);
         let (known, reached, open) = (HashMap::new(), Vec::new(), BinaryHeap::new());
-        Frontier { task, greed, heuristic, known, reached, open, looked_at: 0 }
+        let mut frontier = Frontier { task, greed, only_helpful, heuristic, known, reached, open, looked_at: 0 };
+        frontier.visit(task.init.clone(), None, 0.0);
+        frontier
+    }
+    /// Goes on until so many more states were looked at.
+    fn go_on(&mut self, states: usize, expired: &dyn Fn() -> bool) -> Outcome {
+        let until = self.looked_at + states;
+        while self.looked_at < until && !expired() {
+            let Some(next) = self.open.pop() else { return Outcome::Exhausted };
+            let here = &self.reached[next.number as usize];
+            let (state, cost) = (here.state.clone(), here.cost);
+            let full = self.task.with_derived(&state);
+            if self.task.goal.holds(&full) {
+                return Outcome::Found(way_to(next.number, &self.reached));
+            }
+            let actions = match self.only_helpful {
+                true => here.helpful.clone(),
+                false => (0..self.task.actions.len() as u32).collect(),
+            };
+            for number in actions {
+                let action = &self.task.actions[number as usize];
+                if applicable(action, &full) {
+                    self.visit(self.task.after(&state, action), Some((next.number, number)), cost + action.cost);
+                }
+            }
+        }
+        Outcome::Capped
     }
     /// Looks at a state that was reached. One that is known waits again only if the way is cheaper, and one from which
     /// the goal cannot be reached never.
