@@ -96,7 +96,11 @@ impl Grounding<'_> {
                 };
                 let predicate = self.predicate(&format!("{place}/state"), &state.predicate)?;
                 let object = self.acted_on(&object, form, thing, &Role::Effect(predicate.clone()))?;
-                Goal::State { predicate, object, holds: state.holds }
+                let by = match form.by {
+                    Some(by) => Some(self.thing(&format!("{place}/by"), by, &Role::Mentioned)?),
+                    None => None,
+                };
+                Goal::State { predicate, object, holds: state.holds, by }
             }
             GoalForm::At => {
                 let object = self.acted_on(&object, form, thing, &Role::Effect("at".into()))?;
@@ -162,12 +166,13 @@ impl Grounding<'_> {
     /// Fields that say nothing with the goal of a step.
     fn unused(&mut self, place: &str, form: &StepForm) {
         use GoalForm::{At, Await, Each, Find, Performed, State};
-        let fields: [(&str, bool, &[GoalForm]); 9] = [
+        let fields: [(&str, bool, &[GoalForm]); 10] = [
             ("to", form.to.is_some(), &[At, Find]),
             ("function", form.function.is_some(), &[Performed]),
             ("times", form.times.is_some(), &[Performed]),
             ("times_shown_by", form.times_shown_by.is_some(), &[Performed]),
             ("state", form.state.is_some(), &[State]),
+            ("by", form.by.is_some(), &[State]),
             ("order_from", form.order_from.is_some(), &[Each]),
             ("order_named", !form.order_named.is_empty(), &[Each]),
             ("vary", form.vary.is_some(), &[Find]),
