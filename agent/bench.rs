@@ -3,16 +3,20 @@
 //! | module | holds |
 //! |---|---|
 //! | [`targets`] | floors and goals, and the comparison with them |
+//! | [`bddl`] | reads household activities and tabletop tasks of the outside data |
 //! | [`perception`] | real labelled frames, and the fixed rendered suite with its truth |
+//! | [`planner`] | goals of published tasks, plans checked by a simulator of their own |
 //! | [`runtime`] | frames and messages from one to the other, the trace, restarts |
 //! | [`world`] | physics and pictures beside MuJoCo, grasps and primitives, pace, audit, snapshots |
 
+pub mod bddl;
 pub mod perception;
+pub mod planner;
 pub mod runtime;
 pub mod targets;
 pub mod world;
 
-use crate::cli::{BenchArgs, BenchCommand, Exit, PerceptionArgs, WorldArgs};
+use crate::cli::{BenchArgs, BenchCommand, Exit, PerceptionArgs, PlannerArgs, WorldArgs};
 use anyhow::Context;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
@@ -141,6 +145,7 @@ impl BenchResult {
 /// Runs `acm bench`. It ends with 1 if a figure misses its floor or a part could not be measured.
 pub fn run(command: &BenchCommand) -> anyhow::Result<Exit> {
     let (BenchCommand::Perception(PerceptionArgs { common: args, .. })
+    | BenchCommand::Planner(PlannerArgs { common: args, .. })
     | BenchCommand::Runtime(args)
     | BenchCommand::World(WorldArgs { common: args, .. })) = command;
     // First, so that a mistake in the file does not cost the measurement.
@@ -150,6 +155,7 @@ pub fn run(command: &BenchCommand) -> anyhow::Result<Exit> {
     };
     let result = match command {
         BenchCommand::Perception(args) => perception::measure(args, &targets),
+        BenchCommand::Planner(args) => planner::measure(args),
         BenchCommand::Runtime(args) => runtime::measure(args),
         BenchCommand::World(args) => world::measure(args),
     };

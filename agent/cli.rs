@@ -6,7 +6,7 @@ pub mod trace;
 
 use crate::{
     bench,
-    bench::{perception::PerceptionPart, world::WorldPart},
+    bench::{perception::PerceptionPart, planner::PlannerPart, world::WorldPart},
     demo, doctor,
     inject::Injection,
     library,
@@ -395,6 +395,8 @@ pub fn exit_of_error(error: &anyhow::Error) -> Exit {
 pub enum BenchCommand {
     /// Real labelled frames and foreign meshes (found through the variable ACM_DATA), and rendered tables with their truth.
     Perception(PerceptionArgs),
+    /// Goals of published tasks (found through the variable ACM_DATA): solved or not, each plan simulated.
+    Planner(PlannerArgs),
     /// Frames between processes, messages between actors, what a trace costs, how fast an actor is replaced.
     Runtime(BenchArgs),
     /// Physics beside MuJoCo, grasps, primitives, rendering, pace, physics audit, snapshots.
@@ -433,6 +435,17 @@ pub struct PerceptionArgs {
     /// Draw the rendered scenes from this seed on instead of the suite's own: to work on others than are reported.
     #[arg(long, value_name = "N")]
     pub seed_from: Option<u64>,
+}
+
+/// Arguments of `acm bench planner`.
+#[derive(Debug, Args)]
+pub struct PlannerArgs {
+    /// What every bench takes.
+    #[command(flatten)]
+    pub common: BenchArgs,
+    /// Measure these parts alone, in this order.
+    #[arg(long, value_name = "PART,...", value_delimiter = ',', value_enum)]
+    pub only: Vec<PlannerPart>,
 }
 
 /// Arguments of `acm bench world`.

@@ -13,10 +13,12 @@
 //! | `ground` | references to objects and places, against memory |
 //! | `search` | means-ends search over the skills that memory offers |
 //! | `decide` | the order of questions before each step; limits |
+//! | [`classical`] | planning over operators that are data: goals with quantifiers, heuristic search, plans that are checked |
 //! | [`bind`] | a step with perceived geometry, ready for a controller |
 //! | [`decision`], [`explanation`] | the answers and their reasons |
 
 pub mod bind;
+pub mod classical;
 mod decide;
 pub mod decision;
 pub mod explanation;
