@@ -2,9 +2,16 @@
 //!
 //! | module | measures |
 //! |---|---|
+//! | [`alfred`], [`libero`] | instructions of the outside data, with their goals; [`inventory`] and [`scene`] are what they are read in |
+//! | [`instructions`] | how many of them are read right, and which rules of language fire for one family only |
 //! | [`goals`] | goals of tabletop tasks and household activities that are reached, each plan simulated |
 
+pub mod alfred;
 pub mod goals;
+pub mod instructions;
+pub mod inventory;
+pub mod libero;
+pub mod scene;
 
 use super::BenchResult;
 use crate::cli::PlannerArgs;
@@ -15,6 +22,12 @@ use clap::ValueEnum;
 pub enum PlannerPart {
     /// Goals of tabletop tasks and of household activities, given with what holds at first.
     Goals,
+    /// Instructions of tabletop tasks, against their goals.
+    Libero,
+    /// What people wrote of household episodes, against the episodes' goals.
+    Alfred,
+    /// Rules of language that fire for one family of instructions only.
+    Rules,
 }
 
 /// Measures the parts that are asked for, or everything.
@@ -27,6 +40,9 @@ pub fn measure(args: &PlannerArgs) -> anyhow::Result<BenchResult> {
     for part in parts {
         let measured = match part {
             PlannerPart::Goals => goals::measure(&args.common, &mut result),
+            PlannerPart::Libero => instructions::measure_tabletop(&args.common, &mut result),
+            PlannerPart::Alfred => instructions::measure_episodes(&args.common, &mut result),
+            PlannerPart::Rules => instructions::measure_rules(&args.common, &mut result),
         };
         // What the other parts have measured is not lost with it.
         if let Err(error) = measured {

@@ -48,6 +48,8 @@ pub(crate) enum Slot {
     Object,
     /// A destination with its preposition.
     Place,
+    /// A destination whose preposition says that something goes there.
+    Towards,
     /// A destination without preposition.
     Thing,
     /// How often.
@@ -217,6 +219,8 @@ pub(crate) struct Words {
     pub several_ones: Vec<Form>,
     pub idle_adjectives: Vec<Form>,
     pub partitive: Vec<Form>,
+    pub directed: Vec<Form>,
+    pub packages: Vec<Form>,
     pub slices: Vec<Form>,
     pub several_slices: Vec<Form>,
     pub measures: Vec<Form>,
@@ -275,6 +279,15 @@ impl Lexicon {
     /// The nouns that an everyday word may stand for.
     pub(crate) fn meanings(&self, word: &str) -> impl Iterator<Item = &str> {
         self.aliases.get(word).into_iter().flatten().map(String::as_str)
+    }
+    /// The same lexicon without some everyday words for nouns.
+    pub fn without_words(mut self, words: &BTreeSet<String>) -> Lexicon {
+        self.aliases.retain(|word, _| !words.contains(word));
+        self
+    }
+    /// All everyday words for nouns.
+    pub fn everyday_words(&self) -> impl Iterator<Item = &str> {
+        self.aliases.keys().map(String::as_str)
     }
     /// The everyday words for a noun.
     pub fn words_for(&self, noun: &str) -> Vec<&str> {
@@ -358,7 +371,7 @@ mod tests {
     #[test]
     fn an_unknown_slot_and_a_missing_file_are_refused() {
         let mut broken = files();
-        let text = broken["verbs.toml"].replace("{object} up|down|over? {place}", "{objekt} {place}");
+        let text = broken["verbs.toml"].replace("{object} up|down|over|away? {place}", "{objekt} {place}");
         broken.insert("verbs.toml".into(), text);
         assert!(matches!(Lexicon::parse(&broken), Err(LexiconError::Form { form, .. }) if form.contains("objekt")));
         let mut fewer = files();

@@ -1,8 +1,10 @@
 //! References of a task grounded in memory: phrases to objects and places, with the reasons kept.
 
+mod described;
 pub(crate) mod geometry;
 mod history;
 mod object;
+mod part;
 mod place;
 
 use crate::{

@@ -2,7 +2,8 @@
 
 use super::{
     reader::{Captures, Expected, Reader},
-    syntax::{Clause, NounPhrase},
+    role::Role,
+    syntax::{Clause, NounPhrase, PlaceKind, PlacePhrase, Relation},
 };
 use crate::lexicon::{FrameForm, FrameGoal};
 use std::cmp::Reverse;
@@ -10,12 +11,21 @@ use std::cmp::Reverse;
 /// Auxiliaries in a row: "should have been".
 const MAX_AUXILIARIES: usize = 4;
 
+/// What a clause is said of: a thing, and those listed with it.
+type Subject = (NounPhrase, Vec<NounPhrase>);
+
+/// The captures of a clause whose object stands before its verb.
+fn said_of(subject: Option<&Subject>) -> Captures {
+    let (object, also) = subject.cloned().map_or((None, Vec::new()), |(first, also)| (Some(first), also));
+    Captures { object, also, object_given: subject.is_some(), ..Captures::default() }
+}
+
 impl Reader<'_> {
     /// The longest reading of a clause; on equal length the one that needs fewer places to tell things apart, then
     /// the first in the lexicon's order.
     pub fn clause(&self, at: usize, last_frame: Option<usize>, subordinate: bool) -> Option<(Clause, usize)> {
         let mut readings = self.verb_readings(at, at, None);
-        for (subject, end) in self.noun_phrases(at, 0) {
+        for (subject, end) in self.noun_phrase_lists(at, 0) {
             readings.extend(self.subject_readings(at, end, &subject));
         }
         if let Some(frame) = last_frame {
@@ -34,8 +44,8 @@ impl Reader<'_> {
                 self.fail(end, Expected::Other("the end of the clause"));
                 continue;
             }
-            let rank = (end, Reverse(clause.places_named()));
-            if best.as_ref().is_none_or(|(best, longest)| rank > (*longest, Reverse(best.places_named()))) {
+            let rank = |clause: &Clause, end: usize| (end, Reverse(clause.places_named()), self.described_last(clause));
+            if best.as_ref().is_none_or(|(best, longest)| rank(&clause, end) > rank(best, *longest)) {
                 best = Some((clause, end));
             }
         }
@@ -45,10 +55,25 @@ impl Reader<'_> {
         best
     }
 
+    /// Whether what stands last describes the place and not the thing: "the fork in the mug on the table" goes into the
+    /// mug that is on the table, "in the drawer next to the stove" is one place. What carries things and cannot be
+    /// moved stands on nothing: "the cube on the left mat" goes on the right mat.
+    fn described_last(&self, clause: &Clause) -> bool {
+        let Some(PlacePhrase { kind: PlaceKind::At(phrase, _), .. }) = &clause.place else { return false };
+        match phrase.located.as_deref().map(|place| &place.kind) {
+            None => false,
+            Some(PlaceKind::At(_, Relation::On | Relation::In)) => {
+                phrase.noun.is_some() && Role::Effect("at".into()).fits(self.library, phrase.noun.as_deref())
+            }
+            Some(_) => true,
+        }
+    }
+
     pub fn ends_clause(&self, at: usize) -> bool {
         let words = &self.lexicon.words;
         // "... in the microwave to heat it".
-        let purpose = self.is_word(at, "to") && self.word(at + 1).is_some_and(|word| self.lexicon.verbs.contains_key(word));
+        let purpose =
+            self.is_word(at, "to") && self.word(at + 1).is_some_and(|word| self.lexicon.verbs.contains_key(word));
         let markers = [&words.if_markers, &words.unless_markers, &words.otherwise];
         if purpose || markers.iter().any(|forms| self.longest(at, forms).is_some()) {
             return true;
@@ -59,7 +84,7 @@ impl Reader<'_> {
     }
 
     /// Readings that begin with the verb at `at`.
-    fn verb_readings(&self, begin: usize, at: usize, subject: Option<&NounPhrase>) -> Vec<(Clause, usize)> {
+    fn verb_readings(&self, begin: usize, at: usize, subject: Option<&Subject>) -> Vec<(Clause, usize)> {
         let frames = self.word(at).and_then(|word| self.lexicon.verbs.get(word));
         let Some(frames) = frames else {
             return Vec::new();
@@ -68,7 +93,7 @@ impl Reader<'_> {
     }
 
     /// "the cube should be brought to the middle", "the cube goes to the middle", "the cube is in the middle".
-    fn subject_readings(&self, begin: usize, at: usize, subject: &NounPhrase) -> Vec<(Clause, usize)> {
+    fn subject_readings(&self, begin: usize, at: usize, subject: &Subject) -> Vec<(Clause, usize)> {
         let mut verb = at;
         for _ in 0..MAX_AUXILIARIES {
             match self.longest(verb, &self.lexicon.words.auxiliaries) {
@@ -80,25 +105,19 @@ impl Reader<'_> {
         let transfer = self.lexicon.frames.iter().position(|frame| frame.goal == FrameGoal::At);
         if let Some(frame) = transfer {
             for (place, end) in self.places(verb, 0) {
-                let captures = Captures { object: Some(subject.clone()), place: Some(place), ..Captures::default() };
+                let captures = Captures { place: Some(place), ..said_of(Some(subject)) };
                 readings.push((self.filled(begin, end, frame, 0, captures), end));
             }
         }
         readings
     }
 
-    fn frame_readings(
-        &self,
-        begin: usize,
-        at: usize,
-        index: usize,
-        subject: Option<&NounPhrase>,
-    ) -> Vec<(Clause, usize)> {
+    fn frame_readings(&self, begin: usize, at: usize, index: usize, subject: Option<&Subject>) -> Vec<(Clause, usize)> {
         let Some(frame) = self.lexicon.frames.get(index) else { return Vec::new() };
         if frame.said_of_object && subject.is_none() {
             return Vec::new();
         }
-        let given = Captures { object: subject.cloned(), object_given: subject.is_some(), ..Captures::default() };
+        let given = said_of(subject);
         let mut readings = Vec::new();
         for (number, FrameForm { form, history, times }) in frame.forms.iter().enumerate() {
             for (captures, end) in self.form(at, form, &given, 0) {

@@ -41,7 +41,7 @@ impl Reader<'_> {
         let mut best: Option<(Modifier, usize)> = None;
         for (index, modifier) in self.lexicon.modifiers.iter().enumerate() {
             for (captures, end) in self.form(at, &modifier.form, &Captures::default(), 1) {
-                if end == at || best.as_ref().is_some_and(|(_, longest)| *longest >= end) || !self.ends_clause(end) {
+                if end == at || best.as_ref().is_some_and(|(_, longest)| *longest >= end) {
                     continue;
                 }
                 let thing = captures.it.or(match captures.place.map(|place| place.kind) {
@@ -60,6 +60,11 @@ impl Reader<'_> {
             }
         }
         best
+    }
+
+    /// A modifier in a clause of its own.
+    pub fn manner(&self, at: usize) -> Option<(Modifier, usize)> {
+        self.clause_modifier(at).filter(|(_, end)| self.ends_clause(*end) || self.clause_modifier(*end).is_some())
     }
 
     /// All modifiers from `at` on, with or without commas between them.

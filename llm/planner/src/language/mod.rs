@@ -14,23 +14,36 @@ mod phrase;
 mod place;
 mod reader;
 mod role;
+mod rules;
 mod sentence;
 mod syntax;
 mod token;
 
 pub use error::ParseError;
-pub use sentence::MAX_CLAUSES;
 pub(crate) use interpret::{nouns_of, settle_subtasks};
 pub(crate) use role::{CONTAINS, Role, SUPPORTIVE};
+pub use sentence::MAX_CLAUSES;
 pub use token::{MAX_BYTES, MAX_TOKENS};
 
 use crate::{lexicon::Lexicon, task::Task};
 use acm_concept::template::TemplateLibrary;
 use reader::{Expected, Reader};
+use std::collections::BTreeSet;
+use syntax::Sentence;
 use token::Token;
 
 /// Reads an instruction with the nouns and functions of a library.
 pub(crate) fn parse(lexicon: &Lexicon, library: &TemplateLibrary, text: &str) -> Result<Task, ParseError> {
+    let sentences = sentences(lexicon, library, text)?;
+    interpret::interpret(lexicon, library, text, &sentences)
+}
+
+/// The names of the rules that the reading of an instruction rests on.
+pub(crate) fn rules(lexicon: &Lexicon, library: &TemplateLibrary, text: &str) -> Result<BTreeSet<String>, ParseError> {
+    Ok(rules::rules(lexicon, &sentences(lexicon, library, text)?))
+}
+
+fn sentences(lexicon: &Lexicon, library: &TemplateLibrary, text: &str) -> Result<Vec<Sentence>, ParseError> {
     let tokens = without_ignored(lexicon, library, token::tokenize(text)?);
     if tokens.iter().all(|token| token.stop) {
         return Err(ParseError::Empty);
@@ -40,7 +53,7 @@ pub(crate) fn parse(lexicon: &Lexicon, library: &TemplateLibrary, text: &str) ->
     if sentences.len() > MAX_CLAUSES {
         return Err(ParseError::TooLong { unit: "clauses", length: sentences.len(), limit: MAX_CLAUSES });
     }
-    interpret::interpret(lexicon, library, text, &sentences)
+    Ok(sentences)
 }
 
 /// Drops words that say nothing here ("please", "carefully").

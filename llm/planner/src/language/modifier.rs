@@ -3,6 +3,7 @@
 use super::{
     phrase::Phrases,
     reader::Reader,
+    role::{CONTAINS, Role},
     syntax::{NounPhrase, PlaceKind, PlacePhrase, Relation},
 };
 use crate::task::{Direction, Quantity, Rank};
@@ -22,9 +23,11 @@ impl Reader<'_> {
         }
         starts.push(at);
         for start in starts {
-            for end in self.class(start, &words.standing) {
-                let article = self.longest(end, &words.definite).unwrap_or(end);
-                if let Some(whole) = self.longest(article, &words.whole) {
+            for end in self.class(start, &words.standing).into_iter().chain(self.class(start, &words.sources)) {
+                let article = self.longest(end, &words.definite).or_else(|| self.longest(end, &words.indefinite));
+                let article = article.unwrap_or(end);
+                // A table that the library knows is a thing like others.
+                if let Some(whole) = self.longest(article, &words.whole).filter(|_| self.noun(article).is_none()) {
                     readings.push((phrase.clone(), whole));
                 }
             }
@@ -122,7 +125,9 @@ impl Reader<'_> {
         let mut readings = Vec::new();
         for start in self.class(at, &words.containing) {
             for (content, end) in self.noun_phrases(start, depth + 1) {
-                let mut ends = self.class(end, &words.within_it);
+                let contains = Role::Affordance(CONTAINS).fits(self.library, phrase.noun.as_deref());
+                let inside = self.longest(end, &words.prepositions_in).is_some();
+                let mut ends = if inside && !contains { Vec::new() } else { self.class(end, &words.within_it) };
                 ends.push(end);
                 for end in ends {
                     readings.push((NounPhrase { contains: vec![content.clone()], ..phrase.clone() }, end));
@@ -151,7 +156,8 @@ impl Reader<'_> {
             _ => None,
         };
         let rank = ranked.or(last).or(before).unwrap_or((-1, after));
-        let phrase = NounPhrase { rank: None, quantity: Quantity::TheOne, handled: Some((frame, rank.0)), ..phrase.clone() };
+        let phrase =
+            NounPhrase { rank: None, quantity: Quantity::TheOne, handled: Some((frame, rank.0)), ..phrase.clone() };
         vec![(phrase, rank.1)]
     }
 }

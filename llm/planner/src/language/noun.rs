@@ -2,6 +2,8 @@
 
 use super::reader::Reader;
 
+/// The state of what is spoken of as a slice.
+const SLICED: &str = "sliced";
 /// Words of the longest noun.
 const MAX_WORDS: usize = 4;
 
@@ -9,8 +11,8 @@ const MAX_WORDS: usize = 4;
 pub(super) struct NounReading {
     pub noun: String,
     pub plural: bool,
-    /// "a slice of bread".
-    pub sliced: bool,
+    /// What the measure says: "a slice of cold bread" is sliced and cold.
+    pub states: Vec<(String, bool)>,
     pub end: usize,
 }
 
@@ -22,9 +24,13 @@ impl Reader<'_> {
         // "slice of bread", "bar of soap"; and "bread slice".
         let measured = self.measured_noun(at).filter(|reading| reading.end > longest);
         let mut reading = measured.or(plain)?;
+        // "the cookies box": what it comes in.
+        if let Some(end) = self.longest(reading.end, &self.lexicon.words.packages).filter(|_| !reading.plural) {
+            reading.end = end;
+        }
         if let Some(end) = self.longest(reading.end, &self.lexicon.words.slices) {
             reading.plural = self.longest(reading.end, &self.lexicon.words.several_slices).is_some();
-            reading.sliced = true;
+            reading.states.push((SLICED.into(), true));
             reading.end = end;
         }
         Some(reading)
@@ -37,7 +43,7 @@ impl Reader<'_> {
                 continue;
             }
             if let Some((noun, plural)) = self.noun_of(&words.join(" ")) {
-                return Some(NounReading { noun, plural, sliced: false, end: at + length });
+                return Some(NounReading { noun, plural, states: Vec::new(), end: at + length });
             }
         }
         None
@@ -53,14 +59,26 @@ impl Reader<'_> {
         if !self.is_word(measure, "of") {
             return None;
         }
-        let start = self.longest(measure + 1, &words.definite).unwrap_or(measure + 1);
-        let start = self.skip_adjectives(start);
+        let article =
+            [&words.definite, &words.indefinite].into_iter().find_map(|forms| self.longest(measure + 1, forms));
+        let mut start = self.skip_adjectives(article.unwrap_or(measure + 1));
+        let mut states = Vec::new();
+        while let Some((state, holds, end)) = self.state_adjective(start) {
+            states.push((state, holds));
+            start = end;
+        }
         let mut reading = self.plain_noun(start)?;
         let measured = self.word(at).unwrap_or_default();
         reading.plural = self.singulars(measured).into_iter().any(|(_, plural)| plural) && measured.ends_with('s');
-        reading.sliced = sliced;
+        if sliced {
+            states.push((SLICED.into(), true));
+        }
+        reading.states = states;
         if !sliced {
-            let compound = self.singulars(measured).into_iter().find_map(|(one, _)| self.noun_of(&format!("{} {one}", reading.noun)));
+            let compound = self
+                .singulars(measured)
+                .into_iter()
+                .find_map(|(one, _)| self.noun_of(&format!("{} {one}", reading.noun)));
             if let Some((noun, _)) = compound {
                 reading.noun = noun;
             }

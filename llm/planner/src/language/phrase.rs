@@ -75,8 +75,7 @@ impl Reader<'_> {
 
     fn determiners(&self, at: usize, depth: u32) -> Vec<Determiner> {
         let words = &self.lexicon.words;
-        let plain =
-            |end: usize, quantity: Quantity| Determiner { end, quantity, each: false, its: false, owner: None };
+        let plain = |end: usize, quantity: Quantity| Determiner { end, quantity, each: false, its: false, owner: None };
         let mut options: Vec<Determiner> = Vec::new();
         for end in self.class(at, &words.definite) {
             let its = self.is_word(at, "its");
@@ -127,10 +126,19 @@ impl Reader<'_> {
         let mut end = start;
         let mut adjectives = 0;
         let mut heads = Vec::new();
+        let mut elided: Phrases = Vec::new();
+        // Adjectives parted by a comma or "and" need their noun.
+        let mut parted = false;
         loop {
             // A noun may begin with a word that is also an adjective: "cold drink", "orange".
             heads.extend(self.named(&phrase, end));
+            // "red, green and blue": each may be a phrase of its own.
+            if !parted && phrase.color.is_some() && (self.is_stop(end) || self.is_word(end, "and")) {
+                elided.push((NounPhrase { elided: true, ..phrase.clone() }, end));
+            }
+            let parts = self.is_stop(end) || self.is_word(end, "and");
             let Some(next) = self.adjective(&mut phrase, end) else { break };
+            parted |= parts;
             end = next;
             adjectives += 1;
         }
@@ -140,7 +148,8 @@ impl Reader<'_> {
             if let Some(next) = self.longest(end, &words.things).filter(|_| end > at) {
                 let elided = self.longest(end, &words.ones).is_some();
                 let several = self.longest(end, &words.several_ones).is_some();
-                let quantity = if several && phrase.quantity == Quantity::TheOne { Quantity::Group } else { phrase.quantity };
+                let quantity =
+                    if several && phrase.quantity == Quantity::TheOne { Quantity::Group } else { phrase.quantity };
                 heads.push((NounPhrase { elided, quantity, ..phrase }, next));
             } else {
                 let unknown = self.word(end).is_some_and(|word| !self.lexicon.known_words.contains(word));
@@ -148,12 +157,14 @@ impl Reader<'_> {
                     self.fail(end, if unknown { Expected::Noun } else { Expected::Other("a noun that I know") });
                 }
                 // "the red" after "the blue cube": a noun may be left out after a colour or a side, not after nothing.
-                let rest = phrase.color.is_some() || (start > at && (phrase.rank.is_some() || phrase.other)) || phrase.each;
-                if !unknown && rest && start + adjectives > at && end > at {
+                let rest =
+                    phrase.color.is_some() || (start > at && (phrase.rank.is_some() || phrase.other)) || phrase.each;
+                if !unknown && rest && !parted && start + adjectives > at && end > at {
                     heads.push((NounPhrase { elided: true, ..phrase }, end));
                 }
             }
         }
+        heads.extend(elided);
         for (phrase, end) in &mut heads {
             phrase.span = self.span(at, *end);
         }
@@ -165,8 +176,10 @@ impl Reader<'_> {
         let mut named = Vec::new();
         if let Some(reading) = self.noun(end) {
             let mut phrase = NounPhrase { noun: Some(reading.noun), ..phrase.clone() };
-            if reading.sliced && !phrase.states.iter().any(|(state, _)| state == SLICED) {
-                phrase.states.push((SLICED.into(), true));
+            for state in reading.states {
+                if !phrase.states.contains(&state) {
+                    phrase.states.push(state);
+                }
             }
             // "one of the cubes" is one cube.
             if reading.plural && phrase.quantity == Quantity::TheOne {
@@ -260,8 +273,9 @@ impl Reader<'_> {
         self.noun(self.skip_adjectives(at)).is_some() || self.longest(at, &self.lexicon.words.ones).is_some()
     }
 
-    fn state_adjective(&self, at: usize) -> Option<(String, bool, usize)> {
-        let readings = self.lexicon.states.iter().filter_map(|state| Some((state, self.longest(at, &state.adjectives)?)));
+    pub(super) fn state_adjective(&self, at: usize) -> Option<(String, bool, usize)> {
+        let readings =
+            self.lexicon.states.iter().filter_map(|state| Some((state, self.longest(at, &state.adjectives)?)));
         let (state, end) = readings.max_by_key(|(_, end)| *end)?;
         Some((state.predicate.clone(), state.holds, end))
     }
@@ -298,9 +312,6 @@ impl Reader<'_> {
         readings
     }
 }
-
-/// The state of what is spoken of as a slice.
-const SLICED: &str = "sliced";
 
 pub(super) fn keep_longest_first<T>(readings: &mut Vec<(T, usize)>) {
     readings.sort_by_key(|(_, end)| std::cmp::Reverse(*end));

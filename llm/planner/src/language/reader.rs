@@ -2,7 +2,7 @@
 
 use super::{
     phrase::Phrases,
-    syntax::{NounPhrase, PlacePhrase, Relation, Statement},
+    syntax::{NounPhrase, PlaceKind, PlacePhrase, Relation, Statement},
     token::Token,
 };
 use crate::{
@@ -62,6 +62,7 @@ pub(super) struct Captures {
 /// Reads phrases from the tokens of one instruction.
 pub(super) struct Reader<'a> {
     pub lexicon: &'a Lexicon,
+    pub library: &'a TemplateLibrary,
     pub tokens: &'a [Token],
     pub nouns: BTreeSet<&'a str>,
     spent: Cell<u32>,
@@ -73,7 +74,15 @@ pub(super) struct Reader<'a> {
 impl<'a> Reader<'a> {
     pub fn new(lexicon: &'a Lexicon, library: &'a TemplateLibrary, tokens: &'a [Token]) -> Reader<'a> {
         let nouns = library.iter().flat_map(|t| t.synopsis.nouns.iter().map(|noun| noun.noun.as_str())).collect();
-        Reader { lexicon, tokens, nouns, spent: Cell::new(0), failure: RefCell::default(), phrases: RefCell::default() }
+        Reader {
+            lexicon,
+            library,
+            tokens,
+            nouns,
+            spent: Cell::new(0),
+            failure: RefCell::default(),
+            phrases: RefCell::default(),
+        }
     }
     pub(super) fn phrases_known(&self, at: usize, depth: u32) -> Option<Phrases> {
         self.phrases.borrow().get(&(at, depth)).cloned()
@@ -187,10 +196,13 @@ impl<'a> Reader<'a> {
             Slot::Object if captures.object_given => vec![(captures.clone(), at)],
             Slot::Object => {
                 let lists = self.noun_phrase_lists(at, depth).into_iter();
-                lists.map(|((first, also), end)| {
-                    with(&|c| (c.object, c.also) = (Some(first.clone()), also.clone()), end)
-                }).collect()
+                lists
+                    .map(|((first, also), end)| {
+                        with(&|c| (c.object, c.also) = (Some(first.clone()), also.clone()), end)
+                    })
+                    .collect()
             }
+            Slot::Single if captures.object_given => vec![(captures.clone(), at)],
             Slot::Single => {
                 let phrases = self.noun_phrases(at, depth).into_iter();
                 phrases.map(|(phrase, end)| with(&|c| c.object = Some(phrase.clone()), end)).collect()
@@ -205,7 +217,8 @@ impl<'a> Reader<'a> {
             }
             Slot::Side => {
                 let sides = self.meaning(at, &self.lexicon.directions).into_iter();
-                sides.map(|(side, end)| with(&|c| c.side = Some(side), end)).collect()
+                // "from left to right" begins at the first.
+                sides.map(|(side, end)| with(&|c| c.side = c.side.or(Some(side)), end)).collect()
             }
             Slot::Kind => self.kinds(at).into_iter().map(|end| (captures.clone(), end)).collect(),
             Slot::Not => match self.longest(at, &self.lexicon.words.not) {
@@ -215,6 +228,16 @@ impl<'a> Reader<'a> {
             Slot::Place => {
                 let places = self.places(at, depth).into_iter();
                 places.map(|(place, end)| with(&|c| c.place = Some(place.clone()), end)).collect()
+            }
+            Slot::Towards => {
+                // "on the mat" says where a thing is that is taken, "to the mat" where it is taken to.
+                let directed = self.longest(at, &self.lexicon.words.directed).is_some();
+                let past = |place: &PlacePhrase| matches!(place.kind, PlaceKind::History(..));
+                let places = self.places(at, depth).into_iter();
+                places
+                    .filter(|(place, _)| directed || past(place))
+                    .map(|(place, end)| with(&|c| c.place = Some(place.clone()), end))
+                    .collect()
             }
             Slot::Thing => {
                 let places = self.bare_places(at, Relation::On, depth).into_iter();
@@ -237,7 +260,7 @@ impl<'a> Reader<'a> {
         }
     }
     /// "the red cube, the blue one and the can".
-    fn noun_phrase_lists(&self, at: usize, depth: u32) -> Vec<((NounPhrase, Vec<NounPhrase>), usize)> {
+    pub(super) fn noun_phrase_lists(&self, at: usize, depth: u32) -> Vec<((NounPhrase, Vec<NounPhrase>), usize)> {
         let mut lists: Vec<((NounPhrase, Vec<NounPhrase>), usize)> = Vec::new();
         let mut open: Vec<((NounPhrase, Vec<NounPhrase>), usize)> =
             self.noun_phrases(at, depth).into_iter().map(|(phrase, end)| ((phrase, Vec::new()), end)).collect();

@@ -50,7 +50,9 @@ impl Reader<'_> {
         if let Some(end) = self.guarded(course, at) {
             return Some(end);
         }
-        if let Some((modifier, end)) = self.clause_modifier(at).filter(|(modifier, _)| begun && modifier.kind != ModifierKind::EachTry) {
+        if let Some((modifier, end)) =
+            self.manner(at).filter(|(modifier, _)| begun && modifier.kind != ModifierKind::EachTry)
+        {
             course.sentences.push(Sentence::Manner { modifier: Box::new(modifier) });
             return Some(end);
         }
@@ -65,7 +67,8 @@ impl Reader<'_> {
             course.sentences.push(Sentence::Once { condition: Box::new(condition), trails });
             return Some(end);
         }
-        let clause = |at, frame, subordinate| self.clause(at, frame, subordinate).map(|(clause, end)| (Box::new(clause), end));
+        let clause =
+            |at, frame, subordinate| self.clause(at, frame, subordinate).map(|(clause, end)| (Box::new(clause), end));
         let guard = course.guard.clone().map(Box::new);
         let (sentence, end) = if let Some(start) = self.longest(at, &words.before_markers) {
             let (clause, end) = clause(start, None, true)?;
@@ -126,11 +129,15 @@ impl Reader<'_> {
         let mut end = said.unwrap_or(at);
         let mut things = Vec::new();
         while things.len() < MAX_THINGS {
-            let (thing, after) = self.noun_phrases(end, 0).into_iter().find(|(_, end)| {
-                self.is_word(*end, "and") || self.is_stop(*end) || *end >= self.tokens.len()
-            })?;
+            let (thing, after) = self
+                .noun_phrases(end, 0)
+                .into_iter()
+                .find(|(_, end)| self.is_word(*end, "and") || self.is_stop(*end) || *end >= self.tokens.len())?;
             things.push(thing);
             let colon = self.tokens.get(after).is_some_and(|token| [":", ".", "-", ";"].contains(&token.text.as_str()));
+            // "Given two cells, find ...".
+            let verb = self.word(after + 1).is_some_and(|word| self.lexicon.verbs.contains_key(word));
+            let colon = colon || (said.is_some() && self.is_comma(after) && verb);
             if colon && (said.is_some() || after + 1 < self.tokens.len()) {
                 return Some((things, after + 1));
             }
@@ -172,7 +179,7 @@ impl Reader<'_> {
 
     /// Whether a modifier stands here that a connector ("in turn", "first") must not swallow.
     fn begins_manner(&self, at: usize) -> bool {
-        self.clause_modifier(at).is_some()
+        self.manner(at).is_some()
     }
 
     fn leave(&self, at: usize) -> Option<(Sentence, usize)> {

@@ -40,6 +40,8 @@ struct RawWords {
     several_ones: Vec<String>,
     idle_adjectives: Vec<String>,
     partitive: Vec<String>,
+    directed: Vec<String>,
+    packages: Vec<String>,
     slices: Vec<String>,
     several_slices: Vec<String>,
     measures: Vec<String>,
@@ -274,6 +276,8 @@ fn closed_classes(raw: &RawWords) -> Result<Words, LexiconError> {
         several_ones: phrases(&raw.several_ones)?,
         idle_adjectives: phrases(&raw.idle_adjectives)?,
         partitive: phrases(&raw.partitive)?,
+        directed: phrases(&raw.directed)?,
+        packages: phrases(&raw.packages)?,
         slices: phrases(&raw.slices)?,
         several_slices: phrases(&raw.several_slices)?,
         measures: phrases(&raw.measures)?,
@@ -364,7 +368,14 @@ fn frame(raw: &RawFrame) -> Result<Frame, LexiconError> {
     let read =
         |raw: &RawForm| Ok(FrameForm { form: form("verbs.toml", &raw.form)?, history: raw.history, times: raw.times });
     let forms = raw.forms.iter().map(read).collect::<Result<_, _>>()?;
-    Ok(Frame { name: raw.name.clone(), goal, said_of_object: raw.said_of_object, tool_state: raw.tool_state.clone(), into: raw.into.clone(), forms })
+    Ok(Frame {
+        name: raw.name.clone(),
+        goal,
+        said_of_object: raw.said_of_object,
+        tool_state: raw.tool_state.clone(),
+        into: raw.into.clone(),
+        forms,
+    })
 }
 
 fn verb_forms(raw: &RawVerbs) -> BTreeMap<String, Vec<usize>> {
@@ -461,6 +472,7 @@ fn slot(name: &str) -> Option<Slot> {
         "object" => Slot::Object,
         "place" => Slot::Place,
         "thing" => Slot::Thing,
+        "towards" => Slot::Towards,
         "times" => Slot::Times,
         "it" => Slot::It,
         "its" => Slot::Its,
@@ -510,6 +522,8 @@ fn known_words(lexicon: &Lexicon) -> BTreeSet<String> {
         &w.several_ones,
         &w.idle_adjectives,
         &w.partitive,
+        &w.directed,
+        &w.packages,
         &w.slices,
         &w.several_slices,
         &w.measures,

@@ -114,7 +114,11 @@ impl<'a> Grounding<'a> {
     /// A thing that is to play a role and is one, not a group.
     fn one(&mut self, place: &str, index: usize, role: &Role) -> Option<usize> {
         let index = self.thing(place, index, role)?;
-        if self.things.get(index).is_some_and(|thing| matches!(thing.quantity, QuantityForm::Group | QuantityForm::Count)) {
+        if self
+            .things
+            .get(index)
+            .is_some_and(|thing| matches!(thing.quantity, QuantityForm::Group | QuantityForm::Count))
+        {
             self.fault(place, "a group stands where one thing must be named");
             return None;
         }

@@ -108,6 +108,12 @@ impl Grounding<'_> {
                     self.fault(&format!("{place}/to"), "goal `at` needs a place");
                     return None;
                 };
+                // Within a step for each of a group the group stands for the one whose turn it is.
+                if let (None, Some(thing), PlaceKind::On | PlaceKind::In | PlaceKind::Under) =
+                    (form.part_of, to.thing, to.kind)
+                {
+                    self.one(&format!("{place}/to/thing"), thing, &Role::Mentioned)?;
+                }
                 let half = second.get(index).copied().flatten();
                 if to.kind == PlaceKind::InPlaceOf && half.is_none() {
                     let reason = "two things that change places are two steps in a row, each in-place-of the other";
@@ -195,7 +201,10 @@ impl Grounding<'_> {
             }
             (None, None, Some(_)) => Times::Until(self.until(place, form)??),
             _ => {
-                self.fault(&format!("{place}/times"), "how often is said by `times`, `times_shown_by` or `until` alone");
+                self.fault(
+                    &format!("{place}/times"),
+                    "how often is said by `times`, `times_shown_by` or `until` alone",
+                );
                 return None;
             }
         })

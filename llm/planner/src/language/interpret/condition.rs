@@ -24,12 +24,7 @@ impl Interpretation<'_> {
                 _ => return Err(self.unsupported(place.span, "I cannot tell whether a thing is there")),
             }
         }
-        Ok(Condition {
-            predicate: statement.predicate.clone(),
-            arguments,
-            negated: statement.negated,
-            judged_at: None,
-        })
+        Ok(Condition { predicate: statement.predicate.clone(), arguments, negated: statement.negated, judged_at: None })
     }
 
     /// "... if it is open", behind the clause itself.
@@ -63,9 +58,8 @@ impl Interpretation<'_> {
     pub(super) fn tries(&self, clause: &Clause) -> bool {
         let open = matches!(self.drafts.last(), Some(Draft { subtask, .. })
             if matches!(subtask.goal, Goal::Find { probe: None, sign: None, .. }));
-        let of_moment = |modifier: &Modifier| {
-            modifier.condition.as_ref().is_some_and(|statement| statement.about.is_none())
-        };
+        let of_moment =
+            |modifier: &Modifier| modifier.condition.as_ref().is_some_and(|statement| statement.about.is_none());
         open && matches!(clause.goal, FrameGoal::Performed(_))
             && clause.modifier(ModifierKind::Until).is_some_and(of_moment)
     }

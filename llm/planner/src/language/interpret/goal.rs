@@ -96,7 +96,8 @@ impl Interpretation<'_> {
 
     /// "Put the fork in the mug and put it on the table": what was filled goes on with what is in it.
     fn carrier_meant(&self, phrase: &NounPhrase, clause: &Clause) -> Option<ReferenceIndex> {
-        let history = matches!(clause.place, Some(PlacePhrase { kind: PlaceKind::History(..), .. })) || clause.place.is_none();
+        let history =
+            matches!(clause.place, Some(PlacePhrase { kind: PlaceKind::History(..), .. })) || clause.place.is_none();
         if phrase.pronoun.is_none() || history || clause.goal != FrameGoal::At {
             return None;
         }
@@ -161,6 +162,9 @@ impl Interpretation<'_> {
                     (None, Some(reference)) => Destination::History { object, reference },
                     (None, None) => self.own_destination(clause)?,
                 };
+                if destination.references() == [object] && !matches!(destination, Destination::History { .. }) {
+                    return Err(self.unsupported(clause.span, "nothing can be put where it is itself the place"));
+                }
                 vec![Goal::At { object, destination }]
             }
         })
@@ -227,7 +231,8 @@ impl Interpretation<'_> {
         if one == other || group(one) || group(other) {
             return Err(self.unsupported(clause.span, "two things that can be told apart change places, no more"));
         }
-        let goal = |object, with, first| Goal::At { object, destination: Destination::Exchanged { with, first, heading } };
+        let goal =
+            |object, with, first| Goal::At { object, destination: Destination::Exchanged { with, first, heading } };
         Ok(vec![goal(one, other, true), goal(other, one, false)])
     }
 

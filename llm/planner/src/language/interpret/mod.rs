@@ -13,8 +13,8 @@ use super::{
 use crate::{
     lexicon::{FrameGoal, Lexicon, ModifierKind},
     task::{
-        Condition, Destination, Goal, Manner, MannerKind, ObjectReference, Ordering, ReferenceIndex, Span, Subtask, Task,
-        Times,
+        Condition, Destination, Goal, Manner, MannerKind, ObjectReference, Ordering, ReferenceIndex, Span, Subtask,
+        Task, Times,
     },
 };
 use acm_concept::template::TemplateLibrary;
@@ -26,14 +26,8 @@ pub(super) fn interpret(
     text: &str,
     sentences: &[Sentence],
 ) -> Result<Task, ParseError> {
-    let mut reading = Interpretation {
-        lexicon,
-        library,
-        text,
-        references: Vec::new(),
-        drafts: Vec::new(),
-        manners: Vec::new(),
-    };
+    let mut reading =
+        Interpretation { lexicon, library, text, references: Vec::new(), drafts: Vec::new(), manners: Vec::new() };
     let mut untouched = Vec::new();
     for sentence in sentences {
         match sentence {
@@ -101,7 +95,9 @@ impl Interpretation<'_> {
             return Ok(());
         }
         let goals = self.goals(clause)?;
-        if background && goals.iter().all(|goal| self.drafts.iter().any(|d| same_but_times(&d.subtask.goal, goal, clause))) {
+        if background
+            && goals.iter().all(|goal| self.drafts.iter().any(|d| same_but_times(&d.subtask.goal, goal, clause)))
+        {
             return Ok(());
         }
         let at = self.place_in_order(order);
@@ -154,10 +150,14 @@ impl Interpretation<'_> {
                 Ok(())
             }
             (ModifierKind::Until, Some(Goal::Find { sign: None, .. })) => self.sign(modifier),
-            (ModifierKind::OneAtATime | ModifierKind::OneToAPlace | ModifierKind::Aside | ModifierKind::TakesPlace, _) => {
-                self.manner_of(modifier)
+            (
+                ModifierKind::OneAtATime | ModifierKind::OneToAPlace | ModifierKind::Aside | ModifierKind::TakesPlace,
+                _,
+            ) => self.manner_of(modifier),
+            _ => {
+                Err(self
+                    .unsupported(modifier.span, "it says how to do something, and nothing before it can be done so"))
             }
-            _ => Err(self.unsupported(modifier.span, "it says how to do something, and nothing before it can be done so")),
         }
     }
 
@@ -227,8 +227,7 @@ fn begins(goal: &Goal, next: &Goal) -> bool {
         (Goal::Holding { object: taken, held: true }, Goal::At { object, .. }) => taken == object,
         (Goal::Holding { object: taken, held: true }, Goal::Holding { object, held: true }) => taken == object,
         (Goal::Each { members: taken, body: first, .. }, Goal::Each { members, body: then, .. }) => {
-            taken == members
-                && matches!((first.as_slice(), then.first()), ([only], Some(next)) if begins(only, next))
+            taken == members && matches!((first.as_slice(), then.first()), ([only], Some(next)) if begins(only, next))
         }
         _ => false,
     }

@@ -3,7 +3,7 @@
 use super::{Interpretation, several};
 use crate::{
     language::{
-        ParseError,
+        CONTAINS, ParseError, SUPPORTIVE,
         role::Role,
         syntax::{NounPhrase, Pronoun},
     },
@@ -57,6 +57,10 @@ impl Interpretation<'_> {
             Some(model) => Some(self.reference(model, &Role::Mentioned)?),
             None => None,
         };
+        let holds = |affordance| Role::Affordance(affordance).fits(self.library, phrase.noun.as_deref());
+        if !phrase.contains.is_empty() && !holds(CONTAINS) && !holds(SUPPORTIVE) {
+            return Err(self.unsupported(phrase.span, "nothing can be in it or on it"));
+        }
         let mut contains = Vec::new();
         for content in &phrase.contains {
             contains.push(self.reference(content, &Role::Mentioned)?);
