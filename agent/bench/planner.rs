@@ -4,6 +4,8 @@
 //! |---|---|
 //! | [`drawn`] | how long plans for thirty objects and forty steps take |
 //! | [`verdicts`] | what the verifier says of finished skills, beside what came of them in truth |
+//! | [`alfred`], [`libero`] | instructions of the outside data, with their goals; [`inventory`] and [`scene`] are what they are read in |
+//! | [`instructions`] | how many of them are read right, and which rules of language fire for one family only |
 //! | [`goals`] | goals of tabletop tasks and household activities that are reached, each plan simulated |
 //! | [`peer`] | pyperplan on the same problems |
 //!
@@ -15,6 +17,12 @@ pub mod peer;
 pub mod published;
 pub mod simulator;
 pub mod verdicts;
+pub mod alfred;
+pub mod goals;
+pub mod instructions;
+pub mod inventory;
+pub mod libero;
+pub mod scene;
 
 use super::BenchResult;
 use crate::cli::PlannerArgs;
@@ -31,6 +39,12 @@ pub enum PlannerPart {
     Verdicts,
     /// pyperplan on the same goals (scripts/peers.sh installs it).
     Peer,
+    /// Instructions of tabletop tasks, against their goals.
+    Libero,
+    /// What people wrote of household episodes, against the episodes' goals.
+    Alfred,
+    /// Rules of language that fire for one family of instructions only.
+    Rules,
 }
 
 /// Measures the parts that are asked for, or everything.
@@ -46,6 +60,9 @@ pub fn measure(args: &PlannerArgs) -> anyhow::Result<BenchResult> {
             PlannerPart::Drawn => drawn::measure(&args.common, &mut result),
             PlannerPart::Verdicts => verdicts::measure(&args.common, &mut result),
             PlannerPart::Peer => peer::measure(&args.common, &mut result),
+            PlannerPart::Libero => instructions::measure_tabletop(&args.common, &mut result),
+            PlannerPart::Alfred => instructions::measure_episodes(&args.common, &mut result),
+            PlannerPart::Rules => instructions::measure_rules(&args.common, &mut result),
         };
         // What the other parts have measured is not lost with it.
         if let Err(error) = measured {

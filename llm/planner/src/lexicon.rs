@@ -5,9 +5,10 @@
 
 mod raw;
 
-use crate::task::{ColorTerm, Direction, Size};
+use crate::task::{ColorTerm, Direction, Size, Variation};
 use acm_concept::color::Lab;
 use acm_memory::query::PlaceReference;
+use serde::Deserialize;
 use std::collections::{BTreeMap, BTreeSet};
 use thiserror::Error;
 
@@ -47,10 +48,24 @@ pub(crate) enum Slot {
     Object,
     /// A destination with its preposition.
     Place,
+    /// A destination whose preposition says that something goes there.
+    Towards,
     /// A destination without preposition.
     Thing,
     /// How often.
     Times,
+    /// The thing acted on, one only.
+    Single,
+    /// What it is done with.
+    Tool,
+    /// What is or is not so.
+    Condition,
+    /// A side.
+    Side,
+    /// A noun that says nothing more.
+    Kind,
+    /// "not", for a condition that must not hold.
+    Not,
     /// The thing whose past is meant.
     It,
     /// "its", "the", or a genitive.
@@ -82,6 +97,12 @@ pub(crate) enum FrameGoal {
     Holding(bool),
     /// A function is performed on the object.
     Performed(String),
+    /// A predicate holds of the object, or does not.
+    State(String, bool),
+    /// Something about the object, a group, is varied until a sign shows.
+    Find(Variation),
+    /// Nothing is done before the condition holds.
+    Await,
     /// Nothing has to be done.
     Nothing,
 }
@@ -100,7 +121,59 @@ pub(crate) struct Frame {
     pub name: String,
     pub goal: FrameGoal,
     pub said_of_object: bool,
+    /// The state in which the tool must be: "read the card under the lamp".
+    pub tool_state: Option<String>,
+    /// What the object goes into, for verbs that say it themselves: "discard".
+    pub into: Option<String>,
     pub forms: Vec<FrameForm>,
+}
+
+/// What a modifier of a clause says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum ModifierKind {
+    /// As often as a thing shows.
+    Shown,
+    /// Until a condition holds.
+    Until,
+    /// Only if a condition holds.
+    If,
+    /// Only if it does not.
+    Unless,
+    /// Beginning at a side.
+    From,
+    /// In the order in which the things are named.
+    ThatOrder,
+    /// To try what stands there.
+    EachTry,
+    /// One thing after the other.
+    OneAtATime,
+    /// Never two in one place.
+    OneToAPlace,
+    /// A place for what is put aside.
+    Aside,
+    /// Each takes the other's place.
+    TakesPlace,
+    /// And its heading.
+    TakesHeading,
+}
+
+/// A form of a modifier.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct ModifierForm {
+    pub kind: ModifierKind,
+    pub form: Form,
+}
+
+/// A state with the words that say it.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct StateWords {
+    pub predicate: String,
+    pub holds: bool,
+    /// The subject of a statement is no argument.
+    pub said_of_moment: bool,
+    pub adjectives: Vec<Form>,
+    pub forms: Vec<Form>,
 }
 
 /// A phrase for a place in an object's past.
@@ -125,7 +198,6 @@ pub(crate) struct Words {
     pub definite: Vec<Form>,
     pub indefinite: Vec<Form>,
     pub quantifiers: Vec<Form>,
-    pub numerals: Vec<Form>,
     pub pronouns: Vec<Form>,
     pub things: Vec<Form>,
     pub places: Vec<Form>,
@@ -142,6 +214,32 @@ pub(crate) struct Words {
     pub between: Vec<Form>,
     pub whole: Vec<Form>,
     pub collectives: Vec<Form>,
+    pub plural_pronouns: Vec<Form>,
+    pub ones: Vec<Form>,
+    pub several_ones: Vec<Form>,
+    pub idle_adjectives: Vec<Form>,
+    pub partitive: Vec<Form>,
+    pub directed: Vec<Form>,
+    pub packages: Vec<Form>,
+    pub slices: Vec<Form>,
+    pub several_slices: Vec<Form>,
+    pub measures: Vec<Form>,
+    pub twins: Vec<Form>,
+    pub twin_links: Vec<Form>,
+    pub containing: Vec<Form>,
+    pub within_it: Vec<Form>,
+    pub inside_it: Vec<Form>,
+    pub that_you: Vec<Form>,
+    pub last: Vec<Form>,
+    pub not: Vec<Form>,
+    pub prepositions_in: Vec<Form>,
+    pub prepositions_on: Vec<Form>,
+    pub prepositions_under: Vec<Form>,
+    pub if_markers: Vec<Form>,
+    pub unless_markers: Vec<Form>,
+    pub otherwise: Vec<Form>,
+    pub once_markers: Vec<Form>,
+    pub there: Vec<Form>,
 }
 
 /// Everything the front end knows of language.
@@ -156,7 +254,12 @@ pub struct Lexicon {
     pub(crate) colors: Vec<(ColorTerm, Vec<Form>)>,
     /// Changes of lightness by "dark" and its like.
     pub(crate) shades: Vec<(f64, Vec<Form>)>,
-    pub(crate) aliases: BTreeMap<String, String>,
+    /// How many: "two", "a couple of".
+    pub(crate) counts: Vec<(u32, Form)>,
+    pub(crate) states: Vec<StateWords>,
+    pub(crate) modifiers: Vec<ModifierForm>,
+    /// The nouns that an everyday word may stand for.
+    pub(crate) aliases: BTreeMap<String, Vec<String>>,
     pub(crate) plurals: BTreeMap<String, String>,
     pub(crate) frames: Vec<Frame>,
     /// Frames by inflected verb.
@@ -167,10 +270,29 @@ pub struct Lexicon {
 }
 
 impl Lexicon {
-    /// Reads a lexicon from named texts: `words.toml`, `nouns.toml`, `colors.toml`, `verbs.toml`, `history.toml`.
+    /// Reads a lexicon from named texts: `words.toml`, `nouns.toml`, `household.toml`, `colors.toml`, `verbs.toml`,
+    /// `states.toml`, `modifiers.toml`, `history.toml`.
     /// [`embedded_lexicon`](crate::embedded_lexicon) gives those that ship inside the binary, to begin with.
     pub fn parse(files: &BTreeMap<String, String>) -> Result<Lexicon, LexiconError> {
         raw::parse(files)
+    }
+    /// The nouns that an everyday word may stand for.
+    pub(crate) fn meanings(&self, word: &str) -> impl Iterator<Item = &str> {
+        self.aliases.get(word).into_iter().flatten().map(String::as_str)
+    }
+    /// The same lexicon without some everyday words for nouns.
+    pub fn without_words(mut self, words: &BTreeSet<String>) -> Lexicon {
+        self.aliases.retain(|word, _| !words.contains(word));
+        self
+    }
+    /// All everyday words for nouns.
+    pub fn everyday_words(&self) -> impl Iterator<Item = &str> {
+        self.aliases.keys().map(String::as_str)
+    }
+    /// The everyday words for a noun.
+    pub fn words_for(&self, noun: &str) -> Vec<&str> {
+        let means = |nouns: &Vec<String>| nouns.iter().any(|one| one == noun);
+        self.aliases.iter().filter(|(_, nouns)| means(nouns)).map(|(word, _)| word.as_str()).collect()
     }
     /// The colour terms with their prototypes.
     pub fn colors(&self) -> impl Iterator<Item = &ColorTerm> {
@@ -249,7 +371,7 @@ mod tests {
     #[test]
     fn an_unknown_slot_and_a_missing_file_are_refused() {
         let mut broken = files();
-        let text = broken["verbs.toml"].replace("{object} up|down|over? {place}", "{objekt} {place}");
+        let text = broken["verbs.toml"].replace("{object} up|down|over|away? {place}", "{objekt} {place}");
         broken.insert("verbs.toml".into(), text);
         assert!(matches!(Lexicon::parse(&broken), Err(LexiconError::Form { form, .. }) if form.contains("objekt")));
         let mut fewer = files();

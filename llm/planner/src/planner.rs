@@ -3,16 +3,22 @@
 use crate::{
     bind::{self, BindError},
     decide,
-    decision::{Decision, PlanOptions, Situation, Step},
+    decision::{Decision, PlanOptions, Situation, Step, Unknown},
+    ground::Grounder,
     hybrid::{self, TaskPrompt},
     language::{self, ParseError},
     lexicon::{Lexicon, LexiconError},
-    task::Task,
+    task::{ReferenceIndex, Task},
 };
-use acm_concept::{embodiment::RobotDescription, skill::SkillInvocation, template::TemplateLibrary};
+use acm_concept::{
+    embodiment::RobotDescription,
+    ids::{ObjectId, PartId},
+    skill::SkillInvocation,
+    template::TemplateLibrary,
+};
 use acm_memory::MemoryView;
 use include_dir::{Dir, include_dir};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 static LEXICON: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/lexicon");
 
@@ -54,6 +60,14 @@ impl Planner {
     pub fn parse(&self, instruction: &str, library: &TemplateLibrary) -> Result<Task, ParseError> {
         language::parse(&self.lexicon, library, instruction)
     }
+    /// The names of the rules of language that the reading of an instruction rests on: verb frames, modifiers, kinds of
+    /// phrases.
+    ///
+    /// # Errors
+    /// The instruction cannot be read.
+    pub fn rules(&self, instruction: &str, library: &TemplateLibrary) -> Result<BTreeSet<String>, ParseError> {
+        language::rules(&self.lexicon, library, instruction)
+    }
     /// What a language model is asked in order to read an instruction.
     ///
     /// # Errors
@@ -74,6 +88,26 @@ impl Planner {
     /// The answer that stands for a task.
     pub fn answer(&self, task: &Task) -> hybrid::TaskForm {
         hybrid::TaskForm::new(&self.lexicon, task)
+    }
+    /// The object that a reference of a task means as memory stands, and the part of it where one is meant.
+    ///
+    /// # Errors
+    /// Why no object, or more than one, fits.
+    pub fn meant(
+        &self,
+        task: &Task,
+        view: &dyn MemoryView,
+        options: &PlanOptions,
+        reference: ReferenceIndex,
+    ) -> Result<(ObjectId, Option<PartId>), Unknown> {
+        let grounder = Grounder::new(&self.lexicon, task, view, options, false);
+        let object = grounder.object(reference).map_err(|stuck| stuck.unknown)?;
+        let part = grounder.part(reference).map_err(|stuck| stuck.unknown)?;
+        Ok((object.value, part))
+    }
+    /// What it knows of language.
+    pub fn lexicon(&self) -> &Lexicon {
+        &self.lexicon
     }
     /// The next step of a task as memory stands.
     pub fn decide(&self, task: &Task, view: &dyn MemoryView, situation: &Situation, options: &PlanOptions) -> Decision {

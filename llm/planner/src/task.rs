@@ -169,6 +169,8 @@ pub enum Goal {
         object: ReferenceIndex,
         /// Whether it shall be so.
         holds: bool,
+        /// What it is done with ("with the knife", "in the microwave"), if that is said.
+        by: Option<ReferenceIndex>,
     },
     /// The goals of the body, one after the other, for each member of a group, one member at a time. In the body the
     /// group's index means the member whose turn it is.
@@ -220,7 +222,8 @@ impl Goal {
             Goal::At { destination, .. } => destination.references(),
             Goal::Performed { times: Times::Shown(by), .. } => vec![*by],
             Goal::Performed { times: Times::Until(until), .. } => until.arguments.clone(),
-            Goal::Holding { .. } | Goal::Performed { .. } | Goal::State { .. } => Vec::new(),
+            Goal::State { by, .. } => by.iter().copied().collect(),
+            Goal::Holding { .. } | Goal::Performed { .. } => Vec::new(),
             Goal::Each { order, body, .. } => {
                 let named = if let Ordering::Named(named) = order { named.clone() } else { Vec::new() };
                 named.into_iter().chain(body.iter().flat_map(Goal::references)).collect()

@@ -177,6 +177,10 @@ impl Scenario {
     pub fn sensor(&self) -> &str {
         self.world.cameras.first().map_or("none", |camera| camera.sensor.as_str())
     }
+    /// The first instruction.
+    pub fn instruction(&self) -> &str {
+        &self.task.instruction
+    }
     /// Other wordings of the instruction.
     pub fn paraphrases(&self) -> &[String] {
         &self.paraphrases

@@ -1,9 +1,11 @@
 //! References of a task grounded in memory: phrases to objects and places, with the reasons kept.
 
+mod described;
 pub(crate) mod geometry;
 mod group;
 mod history;
 mod object;
+mod part;
 mod place;
 
 use crate::{

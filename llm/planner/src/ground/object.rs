@@ -8,15 +8,19 @@ use super::{
 use crate::{
     decision::GiveUpCause,
     explanation::ResolvedReference,
-    task::{Destination, Goal, ObjectReference, Quantity, Rank, ReferenceIndex, Size},
+    task::{Destination, Direction, Goal, ObjectReference, Quantity, Rank, ReferenceIndex, Size},
 };
-use acm_concept::{ids::ObjectId, task::OnUnknown};
+use acm_concept::{
+    ids::{ObjectId, PartId},
+    object::GroundedPart,
+    task::OnUnknown,
+};
 use acm_memory::{
     entry::{HistoryEntry, Moment, ObjectEntry, PlaceCause, Presence},
     moves::departures,
     query::{ObjectQuery, PlaceReference, Retrieval},
 };
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 use rand::Rng;
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 
@@ -40,6 +44,12 @@ impl<'a> Grounder<'a> {
             return Ok(Meant { value, guessed: false });
         }
         let reference = self.reference(index)?;
+        // A part is acted on through its object.
+        if depth <= MAX_DEPTH
+            && let Some(whole) = self.whole_of_part(index, depth)?
+        {
+            return Ok(Meant { value: whole, guessed: false });
+        }
         let (retrieval, mut contenders) = self.contenders(index, reference, depth)?;
         if reference.quantity == Quantity::TheOne {
             contenders = self.confirmed(contenders)?;
@@ -135,6 +145,7 @@ impl<'a> Grounder<'a> {
         if self.presupposes_move(index) {
             keep_if_any(&mut contenders, |entry| moved_by(entry, began));
         }
+        self.keep_described(reference, &mut contenders, began, depth)?;
         if let Some(destination) = &reference.located {
             contenders = self.located(&contenders, destination, began, depth)?;
         }
@@ -194,7 +205,12 @@ impl<'a> Grounder<'a> {
         began: Option<Moment>,
         depth: u32,
     ) -> Result<Vec<&'a ObjectEntry>, Stuck> {
-        if let Destination::On { reference } = destination {
+        if let Destination::In { reference } = destination
+            && let Some(part) = self.part_at(*reference, depth + 1)?
+        {
+            return Ok(self.inside_part(contenders, part, began));
+        }
+        if let Destination::On { reference } | Destination::In { reference } = destination {
             let under = self.object_at(*reference, depth + 1)?.value;
             let outline = self.view.object(under).and_then(|entry| Extent::now(self.view, entry));
             let stands = |entry: &&&ObjectEntry| {
@@ -205,6 +221,17 @@ impl<'a> Grounder<'a> {
             };
             return Ok(contenders.iter().filter(stands).copied().collect());
         }
+        if let Destination::Beside { reference, side } = destination {
+            return self.beside_it(contenders, *reference, *side, began, depth);
+        }
+        if matches!(destination, Destination::Middle { of: None })
+            && self.spot(destination, ObjectId(0), depth + 1).is_err()
+        {
+            // Without places to be in the middle of, it is the middle one of its kind.
+            let mut middle = contenders.to_vec();
+            keep_rank(&mut middle, Rank::Middle, began);
+            return Ok(middle);
+        }
         let mut near = Vec::new();
         for entry in contenders {
             let spot = self.spot(destination, entry.id, depth + 1)?.value.pose.translation.truncate();
@@ -214,6 +241,49 @@ impl<'a> Grounder<'a> {
             }
         }
         Ok(near)
+    }
+
+    /// Those nearest to a thing, on a side of it where one is said.
+    fn beside_it(
+        &self,
+        contenders: &[&'a ObjectEntry],
+        of: ReferenceIndex,
+        side: Option<Direction>,
+        began: Option<Moment>,
+        depth: u32,
+    ) -> Result<Vec<&'a ObjectEntry>, Stuck> {
+        let of = self.object_at(of, depth + 1)?.value;
+        let Some((spot, _)) = self.view.object(of).and_then(|entry| place_at(entry, began)) else {
+            return Ok(Vec::new());
+        };
+        let away = |entry: &ObjectEntry| {
+            let (pose, _) = place_at(entry, began)?;
+            let away = pose.translation - spot.translation;
+            let sided = side.is_none_or(|side| away.dot(side.vector()) > 0.5 * away.length());
+            (entry.id != of && sided).then(|| away.truncate().length())
+        };
+        let nearest = contenders.iter().filter_map(|entry| away(entry)).fold(f64::INFINITY, f64::min);
+        let near = |entry: &&&ObjectEntry| away(entry).is_some_and(|distance| distance < nearest + RANK_MARGIN_M);
+        Ok(contenders.iter().filter(near).copied().collect())
+    }
+
+    /// Those that lie in a part: nearest to it of all parts of its name.
+    fn inside_part(&self, contenders: &[&'a ObjectEntry], part: PartId, began: Option<Moment>) -> Vec<&'a ObjectEntry> {
+        let Some(whole) = self.view.object(part.object) else { return Vec::new() };
+        let template = whole.parts.get(part.index as usize).map(|part| part.template.as_str());
+        let top = Extent::now(self.view, whole).map_or(f64::INFINITY, |extent| extent.high);
+        let alike = |(_, other): &(usize, &GroundedPart)| Some(other.template.as_str()) == template;
+        let inside = |entry: &&&ObjectEntry| {
+            place_at(entry, began).is_some_and(|(pose, support)| {
+                let distance = |other: &GroundedPart| other.pose.pose.translation.distance(pose.translation);
+                let nearest =
+                    whole.parts.iter().enumerate().filter(alike).min_by(|a, b| distance(a.1).total_cmp(&distance(b.1)));
+                support == Some(whole.id)
+                    && pose.translation.z < top - RANK_MARGIN_M
+                    && nearest.is_some_and(|(number, _)| number == part.index as usize)
+            })
+        };
+        contenders.iter().filter(inside).copied().collect()
     }
 
     fn was_free(&self, id: ObjectId, began: Option<Moment>) -> bool {
@@ -292,10 +362,18 @@ fn moved_by(entry: &ObjectEntry, began: Option<Moment>) -> bool {
 }
 
 fn keep_rank(contenders: &mut Vec<&ObjectEntry>, rank: Rank, began: Option<Moment>) {
-    let spot =
-        |entry: &ObjectEntry| place_at(entry, began).map_or(DVec2::ZERO, |(pose, _)| pose.translation.truncate());
+    let at = |entry: &ObjectEntry| place_at(entry, began).map_or(DVec3::ZERO, |(pose, _)| pose.translation);
+    let spot = |entry: &ObjectEntry| at(entry).truncate();
+    let heights = contenders.iter().map(|entry| at(entry).z);
+    let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), z| (l.min(z), h.max(z)));
+    // Among things that lie side by side the top one is the one at the back, as in a picture.
+    let side_of = |side: Direction| match side {
+        Direction::Up if high - low < RANK_MARGIN_M => Direction::Back,
+        Direction::Down if high - low < RANK_MARGIN_M => Direction::Front,
+        side => side,
+    };
     let key = |entry: &ObjectEntry, middle: DVec2| match rank {
-        Rank::FromSide(_, side) => -spot(entry).dot(side.vector().truncate()),
+        Rank::FromSide(_, side) => -at(entry).dot(side_of(side).vector()),
         Rank::Middle => spot(entry).distance(middle),
     };
     let middle = contenders.iter().map(|entry| spot(entry)).sum::<DVec2>() / contenders.len().max(1) as f64;

@@ -60,6 +60,7 @@ pub(super) struct StepForm {
     pub times: Option<u32>,
     pub times_shown_by: Option<usize>,
     pub state: Option<StateForm>,
+    pub by: Option<usize>,
     pub order_from: Option<Direction>,
     pub order_named: Vec<usize>,
     pub vary: Option<Variation>,
@@ -280,6 +281,7 @@ impl StepForm {
             times: None,
             times_shown_by: None,
             state: None,
+            by: None,
             order_from: None,
             order_named: Vec::new(),
             vary: None,
@@ -299,8 +301,9 @@ impl StepForm {
                     Times::Until(condition) => step.until = Some(ConditionForm::new(condition)),
                 }
             }
-            Goal::State { predicate, holds, .. } => {
+            Goal::State { predicate, holds, by, .. } => {
                 step.goal = GoalForm::State;
+                step.by = *by;
                 step.state = Some(StateForm::new(predicate, *holds));
             }
             Goal::Each { order, body, .. } => {

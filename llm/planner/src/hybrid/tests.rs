@@ -78,7 +78,7 @@ fn the_schema_has_the_fields_and_the_words_of_the_form() {
             assert!(serde_json::from_value::<T>(name.clone()).is_ok(), "{name}");
         }
     }
-    reads::<crate::task::Quantity>(at(&format!("{thing}/quantity/enum")));
+    reads::<form::QuantityForm>(at(&format!("{thing}/quantity/enum")));
     reads::<crate::task::Size>(at(&format!("{thing}/size/enum")));
     reads::<form::RankFrom>(at(&format!("{thing}/rank_from/enum")));
     reads::<form::GoalForm>(at(&format!("{step}/goal/enum")));

@@ -1,40 +1,59 @@
 //! From an instruction to a [`Task`].
 //!
 //! Words are cut (`token`), phrases and clauses are read by forms from the lexicon with bounded backtracking,
-//! the longest reading first (`reader`, `phrase`, `place`, `clause`), and references are joined (`interpret`).
+//! the longest reading first (`reader`, `noun`, `phrase`, `modifier`, `place`, `condition`, `clause`, `sentence`), and
+//! references are joined (`interpret`). `syntax` is what is between the two.
 
 mod clause;
+mod condition;
 mod error;
 mod interpret;
+mod modifier;
+mod noun;
 mod phrase;
 mod place;
 mod reader;
 mod role;
+mod rules;
+mod sentence;
+mod syntax;
 mod token;
 
-pub use clause::MAX_CLAUSES;
 pub use error::ParseError;
 pub(crate) use interpret::{nouns_of, settle_subtasks};
 pub(crate) use role::{CONTAINS, Role, SUPPORTIVE};
+pub use sentence::MAX_CLAUSES;
 pub use token::{MAX_BYTES, MAX_TOKENS};
 
 use crate::{lexicon::Lexicon, task::Task};
 use acm_concept::template::TemplateLibrary;
 use reader::{Expected, Reader};
+use std::collections::BTreeSet;
+use syntax::Sentence;
 use token::Token;
 
 /// Reads an instruction with the nouns and functions of a library.
 pub(crate) fn parse(lexicon: &Lexicon, library: &TemplateLibrary, text: &str) -> Result<Task, ParseError> {
+    let sentences = sentences(lexicon, library, text)?;
+    interpret::interpret(lexicon, library, text, &sentences)
+}
+
+/// The names of the rules that the reading of an instruction rests on.
+pub(crate) fn rules(lexicon: &Lexicon, library: &TemplateLibrary, text: &str) -> Result<BTreeSet<String>, ParseError> {
+    Ok(rules::rules(lexicon, &sentences(lexicon, library, text)?))
+}
+
+fn sentences(lexicon: &Lexicon, library: &TemplateLibrary, text: &str) -> Result<Vec<Sentence>, ParseError> {
     let tokens = without_ignored(lexicon, library, token::tokenize(text)?);
     if tokens.iter().all(|token| token.stop) {
         return Err(ParseError::Empty);
     }
     let reader = Reader::new(lexicon, library, &tokens);
-    let statements = reader.statements().ok_or_else(|| report(&reader, text))?;
-    if statements.len() > MAX_CLAUSES {
-        return Err(ParseError::TooLong { unit: "clauses", length: statements.len(), limit: MAX_CLAUSES });
+    let sentences = reader.sentences().ok_or_else(|| report(&reader, text))?;
+    if sentences.len() > MAX_CLAUSES {
+        return Err(ParseError::TooLong { unit: "clauses", length: sentences.len(), limit: MAX_CLAUSES });
     }
-    interpret::interpret(library, text, &statements)
+    Ok(sentences)
 }
 
 /// Drops words that say nothing here ("please", "carefully").

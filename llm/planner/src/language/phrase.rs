@@ -1,77 +1,26 @@
-//! Noun phrases.
+//! Noun phrases: determiners, adjectives, and the noun.
 
-use super::reader::{Expected, MAX_READINGS, Reader};
-use crate::task::{ColorTerm, Direction, Quantity, Rank, Size, Span};
-use acm_memory::query::PlaceReference;
+use super::{
+    reader::{Expected, MAX_READINGS, Reader},
+    syntax::{NounPhrase, Pronoun},
+};
+use crate::task::{ColorTerm, Direction, Quantity, Rank};
 
 /// Phrases within phrases that are read: "the cube on the mat between the blocks".
 pub(super) const MAX_DEPTH: u32 = 3;
 /// Modifiers that may follow a noun.
-const MAX_MODIFIERS: usize = 2;
+const MAX_MODIFIERS: usize = 3;
 
-/// A phrase for a thing, as read.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct NounPhrase {
-    pub span: Span,
-    pub pronoun: bool,
-    pub quantity: Quantity,
-    /// "all", "every": read, but not understood as a goal.
-    pub quantified: bool,
-    pub noun: Option<String>,
-    pub color: Option<ColorTerm>,
-    pub size: Option<Size>,
-    pub rank: Option<Rank>,
-    pub free: bool,
-    pub other: bool,
-    pub located: Option<Box<PlacePhrase>>,
-}
+pub(super) type Phrases = Vec<(NounPhrase, usize)>;
 
-/// A phrase for a place, as read.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct PlacePhrase {
-    pub span: Span,
-    pub kind: PlaceKind,
-}
-
-#[derive(Debug, Clone, PartialEq)]
-pub(super) enum PlaceKind {
-    On(NounPhrase),
-    Middle(Option<NounPhrase>),
-    /// "the middle of the table": nothing that memory knows the extent of.
-    MiddleOfWhole,
-    Between(NounPhrase, NounPhrase),
-    Beside(NounPhrase, Option<Direction>),
-    History(Option<NounPhrase>, PlaceReference),
-}
-
-/// A noun as read.
-pub(super) struct NounReading {
-    pub noun: String,
-    pub plural: bool,
-    pub end: usize,
-}
-
-type Phrases = Vec<(NounPhrase, usize)>;
-type Places = Vec<(PlacePhrase, usize)>;
-
-impl NounPhrase {
-    /// How many places the phrase and those within it name to tell things apart.
-    pub fn places_named(&self) -> usize {
-        self.located.as_ref().map_or(0, |place| 1 + place.places_named())
-    }
-}
-
-impl PlacePhrase {
-    /// See [`NounPhrase::places_named`].
-    pub fn places_named(&self) -> usize {
-        match &self.kind {
-            PlaceKind::On(phrase) | PlaceKind::Beside(phrase, _) => phrase.places_named(),
-            PlaceKind::Between(first, second) => first.places_named() + second.places_named(),
-            PlaceKind::Middle(group) => group.as_ref().map_or(0, NounPhrase::places_named),
-            PlaceKind::History(owner, _) => owner.as_ref().map_or(0, NounPhrase::places_named),
-            PlaceKind::MiddleOfWhole => 0,
-        }
-    }
+/// What stands before the adjectives.
+#[derive(Clone)]
+struct Determiner {
+    end: usize,
+    quantity: Quantity,
+    each: bool,
+    its: bool,
+    owner: Option<NounPhrase>,
 }
 
 impl Reader<'_> {
@@ -80,88 +29,172 @@ impl Reader<'_> {
         if depth > MAX_DEPTH || !self.spend() {
             return Vec::new();
         }
+        if let Some(known) = self.phrases_known(at, depth) {
+            return known;
+        }
         let mut readings: Phrases = Vec::new();
-        for (start, quantity, quantified) in self.determiners(at) {
-            if let Some((phrase, end)) = self.head(at, start, quantity, quantified) {
+        for determiner in self.determiners(at, depth) {
+            for (phrase, end) in self.head(at, &determiner) {
                 readings.extend(self.modified(phrase, end, depth));
             }
         }
-        for end in self.class(at, &self.lexicon.words.pronouns) {
-            let pronoun = NounPhrase { pronoun: true, ..self.blank(at, end) };
-            readings.push((pronoun, end));
+        for (pronoun, forms) in
+            [(Pronoun::One, &self.lexicon.words.pronouns), (Pronoun::Several, &self.lexicon.words.plural_pronouns)]
+        {
+            for end in self.class(at, forms) {
+                readings.push((NounPhrase { pronoun: Some(pronoun), ..self.blank(at, end) }, end));
+            }
         }
         keep_longest_first(&mut readings);
+        self.know_phrases(at, depth, &readings);
         readings
     }
 
-    fn blank(&self, at: usize, end: usize) -> NounPhrase {
+    pub(super) fn blank(&self, at: usize, end: usize) -> NounPhrase {
         NounPhrase {
             span: self.span(at, end),
-            pronoun: false,
+            pronoun: None,
             quantity: Quantity::TheOne,
-            quantified: false,
+            each: false,
+            its: false,
             noun: None,
+            elided: false,
             color: None,
             size: None,
             rank: None,
             free: false,
             other: false,
+            states: Vec::new(),
             located: None,
+            part_of: None,
+            twin_of: None,
+            contains: Vec::new(),
+            handled: None,
         }
     }
 
-    fn determiners(&self, at: usize) -> Vec<(usize, Quantity, bool)> {
+    fn determiners(&self, at: usize, depth: u32) -> Vec<Determiner> {
         let words = &self.lexicon.words;
-        let of = |forms, quantity, quantified| {
-            self.class(at, forms).into_iter().map(move |end| (end, quantity, quantified)).collect::<Vec<_>>()
-        };
-        let mut options = of(&words.definite, Quantity::TheOne, false);
-        options.extend(of(&words.indefinite, Quantity::AnyOne, false));
-        for (end, quantity, _) in of(&words.quantifiers, Quantity::Group, true) {
-            let after_article = self.longest(end, &words.definite).unwrap_or(end);
-            options.push((after_article, quantity, true));
+        let plain = |end: usize, quantity: Quantity| Determiner { end, quantity, each: false, its: false, owner: None };
+        let mut options: Vec<Determiner> = Vec::new();
+        for end in self.class(at, &words.definite) {
+            let its = self.is_word(at, "its");
+            // "the two cubes" are all that there are; how many is no description.
+            let counted = self.number(end, &self.lexicon.counts).filter(|(count, _)| *count > 1);
+            if let Some((_, after)) = counted {
+                options.push(plain(after, Quantity::Group));
+            }
+            options.push(Determiner { its, ..plain(end, Quantity::TheOne) });
         }
-        options.push((at, Quantity::TheOne, false));
+        options.extend(self.class(at, &words.indefinite).into_iter().map(|end| plain(end, Quantity::AnyOne)));
+        for end in self.class(at, &words.quantifiers) {
+            let article = self.longest(end, &words.definite).unwrap_or(end);
+            let counted = self.number(article, &self.lexicon.counts).map_or(article, |(_, after)| after);
+            options.push(Determiner { each: true, ..plain(counted, Quantity::Group) });
+        }
+        if let Some((count, end)) = self.number(at, &self.lexicon.counts).filter(|(count, _)| *count > 1) {
+            let of = self.longest(end, &words.partitive).unwrap_or(end);
+            options.push(plain(of, Quantity::Count(count)));
+        }
+        // "the cabinet's top drawer".
+        if depth == 0 && self.genitive_ahead(at) {
+            for (owner, end) in self.noun_phrases(at, depth + 1) {
+                if self.is_word(end, "'s") && owner.located.is_none() && owner.pronoun.is_none() {
+                    let owner = Some(owner);
+                    options.push(Determiner { owner, ..plain(end + 1, Quantity::TheOne) });
+                }
+            }
+        }
+        options.push(plain(at, Quantity::TheOne));
         options
     }
 
-    /// Adjectives and noun after a determiner that ended at `start`.
-    fn head(&self, at: usize, start: usize, quantity: Quantity, quantified: bool) -> Option<(NounPhrase, usize)> {
-        let mut phrase = NounPhrase { quantity, quantified, ..self.blank(at, start) };
+    fn genitive_ahead(&self, at: usize) -> bool {
+        (at..self.tokens.len()).take_while(|place| self.word(*place).is_some()).any(|place| self.is_word(place, "'s"))
+    }
+
+    /// Adjectives and noun after a determiner.
+    fn head(&self, at: usize, determiner: &Determiner) -> Phrases {
+        let start = determiner.end;
+        let mut phrase = NounPhrase {
+            quantity: determiner.quantity,
+            each: determiner.each,
+            its: determiner.its,
+            part_of: determiner.owner.clone().map(Box::new),
+            ..self.blank(at, start)
+        };
         let mut end = start;
         let mut adjectives = 0;
-        while let Some(next) = self.adjective(&mut phrase, end) {
+        let mut heads = Vec::new();
+        let mut elided: Phrases = Vec::new();
+        // Adjectives parted by a comma or "and" need their noun.
+        let mut parted = false;
+        loop {
+            // A noun may begin with a word that is also an adjective: "cold drink", "orange".
+            heads.extend(self.named(&phrase, end));
+            // "red, green and blue": each may be a phrase of its own.
+            if !parted && phrase.color.is_some() && (self.is_stop(end) || self.is_word(end, "and")) {
+                elided.push((NounPhrase { elided: true, ..phrase.clone() }, end));
+            }
+            let parts = self.is_stop(end) || self.is_word(end, "and");
+            let Some(next) = self.adjective(&mut phrase, end) else { break };
+            parted |= parts;
             end = next;
             adjectives += 1;
         }
         let words = &self.lexicon.words;
-        if let Some(noun) = self.noun(end) {
-            phrase.noun = Some(noun.noun);
-            // "one of the cubes" is one cube.
-            if noun.plural && phrase.quantity == Quantity::TheOne {
-                phrase.quantity = Quantity::Group;
-            }
-            end = noun.end;
-        } else if let Some(next) = self.longest(end, &words.things).filter(|_| end > at) {
-            end = next;
-        } else {
-            let unknown = self.word(end).is_some_and(|word| !self.lexicon.known_words.contains(word));
-            if start > at || adjectives > 0 || unknown {
-                self.fail(end, if unknown { Expected::Noun } else { Expected::Other("a noun that I know") });
-            }
-            // "the red" after "the blue cube": a noun may be left out after a colour, not after nothing.
-            if unknown || start == at || phrase.color.is_none() {
-                return None;
+        heads.extend(self.twin(&phrase, determiner, end));
+        if heads.is_empty() {
+            if let Some(next) = self.longest(end, &words.things).filter(|_| end > at) {
+                let elided = self.longest(end, &words.ones).is_some();
+                let several = self.longest(end, &words.several_ones).is_some();
+                let quantity =
+                    if several && phrase.quantity == Quantity::TheOne { Quantity::Group } else { phrase.quantity };
+                heads.push((NounPhrase { elided, quantity, ..phrase }, next));
+            } else {
+                let unknown = self.word(end).is_some_and(|word| !self.lexicon.known_words.contains(word));
+                if start > at || adjectives > 0 || unknown {
+                    self.fail(end, if unknown { Expected::Noun } else { Expected::Other("a noun that I know") });
+                }
+                // "the red" after "the blue cube": a noun may be left out after a colour or a side, not after nothing.
+                let rest =
+                    phrase.color.is_some() || (start > at && (phrase.rank.is_some() || phrase.other)) || phrase.each;
+                if !unknown && rest && !parted && start + adjectives > at && end > at {
+                    heads.push((NounPhrase { elided: true, ..phrase }, end));
+                }
             }
         }
-        phrase.span = self.span(at, end);
-        Some((phrase, end))
+        heads.extend(elided);
+        for (phrase, end) in &mut heads {
+            phrase.span = self.span(at, *end);
+        }
+        heads
+    }
+
+    /// The phrase with the noun at `end`.
+    fn named(&self, phrase: &NounPhrase, end: usize) -> Phrases {
+        let mut named = Vec::new();
+        if let Some(reading) = self.noun(end) {
+            let mut phrase = NounPhrase { noun: Some(reading.noun), ..phrase.clone() };
+            for state in reading.states {
+                if !phrase.states.contains(&state) {
+                    phrase.states.push(state);
+                }
+            }
+            // "one of the cubes" is one cube.
+            if reading.plural && phrase.quantity == Quantity::TheOne {
+                phrase.quantity = Quantity::Group;
+            }
+            named.push((phrase, reading.end));
+        }
+        named
     }
 
     /// Reads one adjective at `at` into the phrase and gives its end.
     fn adjective(&self, phrase: &mut NounPhrase, at: usize) -> Option<usize> {
         let words = &self.lexicon.words;
-        let at = if self.is_stop(at) && (phrase.color.is_some() || phrase.size.is_some()) { at + 1 } else { at };
+        let described = phrase.color.is_some() || phrase.size.is_some() || !phrase.states.is_empty();
+        let at = if (self.is_stop(at) || self.is_word(at, "and")) && described { at + 1 } else { at };
         if let Some(end) = self.longest(at, &words.same) {
             return Some(end);
         }
@@ -171,6 +204,10 @@ impl Reader<'_> {
                 phrase.quantity = Quantity::AnyOne;
             }
             phrase.other = true;
+            return Some(end);
+        }
+        if let Some((state, holds, end)) = self.state_adjective(at) {
+            phrase.states.push((state, holds));
             return Some(end);
         }
         if let Some(end) = self.longest(at, &words.free) {
@@ -186,7 +223,8 @@ impl Reader<'_> {
             return Some(end);
         }
         if let Some((term, end)) = self.color(at) {
-            phrase.color = Some(term);
+            // Of "yellow and white" the first is the one that is looked for.
+            phrase.color.get_or_insert(term);
             return Some(end);
         }
         if let Some((size, end)) = self.meaning(at, &self.lexicon.sizes) {
@@ -201,11 +239,45 @@ impl Reader<'_> {
             phrase.rank = Some(Rank::FromSide(number, direction));
             return Some(end);
         }
-        if let Some(end) = self.longest(at, &words.middle).filter(|&end| self.noun(end).is_some()) {
+        if let Some(end) = self.longest(at, &words.middle).filter(|&end| self.noun_ahead(end)) {
             phrase.rank = Some(Rank::Middle);
             return Some(end);
         }
-        self.longest(at, &words.numerals)
+        self.longest(at, &words.idle_adjectives)
+    }
+
+    /// "its twin", "the cube's twin", "the twin of the cube".
+    fn twin(&self, phrase: &NounPhrase, determiner: &Determiner, end: usize) -> Phrases {
+        let Some(after) = self.longest(end, &self.lexicon.words.twins) else { return Vec::new() };
+        let twin = |model: NounPhrase| NounPhrase {
+            twin_of: Some(Box::new(model)),
+            part_of: None,
+            its: false,
+            ..phrase.clone()
+        };
+        if let Some(owner) = &determiner.owner {
+            return vec![(twin(owner.clone()), after)];
+        }
+        if determiner.its {
+            let it = NounPhrase { pronoun: Some(Pronoun::One), ..self.blank(end, end) };
+            return vec![(twin(it), after)];
+        }
+        if !self.is_word(after, "of") {
+            return Vec::new();
+        }
+        self.noun_phrases(after + 1, 1).into_iter().map(|(model, end)| (twin(model), end)).collect()
+    }
+
+    /// Whether a noun stands at `at`, or behind adjectives.
+    fn noun_ahead(&self, at: usize) -> bool {
+        self.noun(self.skip_adjectives(at)).is_some() || self.longest(at, &self.lexicon.words.ones).is_some()
+    }
+
+    pub(super) fn state_adjective(&self, at: usize) -> Option<(String, bool, usize)> {
+        let readings =
+            self.lexicon.states.iter().filter_map(|state| Some((state, self.longest(at, &state.adjectives)?)));
+        let (state, end) = readings.max_by_key(|(_, end)| *end)?;
+        Some((state.predicate.clone(), state.holds, end))
     }
 
     /// The end of the colours and sizes at `at`.
@@ -217,7 +289,7 @@ impl Reader<'_> {
         at
     }
 
-    fn color(&self, at: usize) -> Option<(ColorTerm, usize)> {
+    pub(super) fn color(&self, at: usize) -> Option<(ColorTerm, usize)> {
         let (lightness, at) = self.meaning(at, &self.lexicon.shades).unwrap_or((0.0, at));
         let readings = self.lexicon.colors.iter().filter_map(|(term, forms)| Some((term, self.longest(at, forms)?)));
         let (term, end) = readings.max_by_key(|(_, end)| *end)?;
@@ -228,34 +300,7 @@ impl Reader<'_> {
         Some((term, if suffix { end + 1 } else { end }))
     }
 
-    /// The noun at `at`, the longest first, as the library calls it.
-    pub fn noun(&self, at: usize) -> Option<NounReading> {
-        for length in (1..=3).rev() {
-            let words: Vec<&str> = (at..at + length).map_while(|place| self.word(place)).collect();
-            if words.len() < length {
-                continue;
-            }
-            let text = words.join(" ");
-            let singulars = [
-                (Some(text.as_str()), false),
-                (self.lexicon.plurals.get(&text).map(String::as_str), true),
-                (text.strip_suffix('s'), true),
-                (text.strip_suffix("es"), true),
-            ];
-            for (singular, plural) in singulars {
-                let Some(singular) = singular else { continue };
-                let noun = self.lexicon.aliases.get(singular).map_or(singular, String::as_str);
-                // The library's own noun stands before an everyday word for another.
-                let noun = if self.nouns.contains(singular) { singular } else { noun };
-                if self.nouns.contains(noun) {
-                    return Some(NounReading { noun: noun.to_owned(), plural, end: at + length });
-                }
-            }
-        }
-        None
-    }
-
-    /// The phrase with nothing, one or two modifiers after it.
+    /// The phrase with nothing or some modifiers after it.
     fn modified(&self, phrase: NounPhrase, end: usize, depth: u32) -> Phrases {
         let mut readings: Phrases = vec![(phrase, end)];
         let mut frontier = readings.clone();
@@ -265,78 +310,6 @@ impl Reader<'_> {
             readings.extend(frontier.iter().cloned());
         }
         readings
-    }
-
-    fn modifiers(&self, phrase: &NounPhrase, at: usize, depth: u32) -> Phrases {
-        let words = &self.lexicon.words;
-        let mut readings = Vec::new();
-        let mut starts = self.class(at, &words.relative_links);
-        for &start in &starts {
-            if let Some((term, end)) = self.color(start).filter(|_| phrase.color.is_none()) {
-                readings.push((NounPhrase { color: Some(term), ..phrase.clone() }, end));
-            }
-        }
-        starts.push(at);
-        for start in starts {
-            for end in self.class(start, &words.standing) {
-                let article = self.longest(end, &words.definite).unwrap_or(end);
-                if let Some(whole) = self.longest(article, &words.whole) {
-                    readings.push((phrase.clone(), whole));
-                }
-            }
-            readings.extend(self.side(phrase, start));
-            if phrase.located.is_none() {
-                readings.extend(self.located(phrase, start, depth));
-            }
-        }
-        for (phrase, end) in &mut readings {
-            phrase.span = phrase.span.join(self.span(at, *end));
-        }
-        readings
-    }
-
-    /// "on the left", "from the right".
-    fn side(&self, phrase: &NounPhrase, at: usize) -> Option<(NounPhrase, usize)> {
-        let from = self.is_word(at, "from");
-        if !from && !["on", "to", "at", "in"].iter().any(|word| self.is_word(at, word)) {
-            return None;
-        }
-        let article = self.longest(at + 1, &self.lexicon.words.definite)?;
-        let (direction, end) = self.meaning(article, &self.lexicon.directions)?;
-        let end = if self.is_word(end, "side") || self.is_word(end, "end") { end + 1 } else { end };
-        // "on the left mat" is a place, not a side.
-        if self.noun(end).is_some() || self.is_word(end, "of") || self.is_word(end, "one") {
-            return None;
-        }
-        let number = match phrase.rank {
-            None if !from => 0,
-            Some(Rank::FromSide(number, Direction::Left)) => number,
-            _ => return None,
-        };
-        Some((NounPhrase { rank: Some(Rank::FromSide(number, direction)), ..phrase.clone() }, end))
-    }
-
-    /// "on the left mat", "between the blocks", "from the middle".
-    fn located(&self, phrase: &NounPhrase, at: usize, depth: u32) -> Phrases {
-        let words = &self.lexicon.words;
-        let mut places: Places = self.between(at, depth + 1);
-        places.extend(self.beside(at, depth + 1));
-        let mut own = Vec::new();
-        for end in self.class(at, &words.standing).into_iter().chain(self.class(at, &words.sources)) {
-            let found = self.bare_places(end, depth + 1);
-            // "the cube from its mat", "from the mat it is on": wherever it stands, so it tells nothing apart.
-            let its = self.is_word(end, "its");
-            for (place, end) in found {
-                match &place.kind {
-                    PlaceKind::On(_) if its => own.push((phrase.clone(), end)),
-                    PlaceKind::History(None, PlaceReference::Now) => own.push((phrase.clone(), end)),
-                    _ => places.push((place, end)),
-                }
-            }
-        }
-        let here = places.into_iter().filter(|(place, _)| !matches!(place.kind, PlaceKind::History(..)));
-        let placed = here.map(|(place, end)| (NounPhrase { located: Some(Box::new(place)), ..phrase.clone() }, end));
-        own.into_iter().chain(placed).collect()
     }
 }
 

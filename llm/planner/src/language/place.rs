@@ -1,8 +1,9 @@
 //! Phrases for places.
 
 use super::{
-    phrase::{MAX_DEPTH, NounPhrase, PlaceKind, PlacePhrase, keep_longest_first},
+    phrase::{MAX_DEPTH, keep_longest_first},
     reader::{Captures, Expected, Reader},
+    syntax::{NounPhrase, PlaceKind, PlacePhrase, Pronoun, Relation},
 };
 use crate::task::Quantity;
 
@@ -22,9 +23,15 @@ impl Reader<'_> {
             readings.extend(self.history(start, depth));
             readings.extend(self.between(start, depth));
             readings.extend(self.beside(start, depth));
-            for end in self.class(start, &words.prepositions) {
-                readings.extend(self.bare_places(end, depth));
+            for (relation, end) in self.relations(start) {
+                readings.extend(self.bare_places(end, relation, depth));
                 readings.extend(self.between(end, depth));
+                readings.extend(self.beside(end, depth));
+            }
+            // "inside" alone: in what was named last.
+            if let Some(end) = self.longest(start, &words.inside_it).filter(|end| self.ends_phrase(*end)) {
+                let it = NounPhrase { pronoun: Some(Pronoun::One), ..self.blank(start, end) };
+                readings.push(self.place(start, end, PlaceKind::At(it, Relation::In)));
             }
         }
         if readings.is_empty() {
@@ -37,13 +44,34 @@ impl Reader<'_> {
         readings
     }
 
+    /// Prepositions of a place at `at`, the longest first.
+    pub fn relations(&self, at: usize) -> Vec<(Relation, usize)> {
+        let words = &self.lexicon.words;
+        let classes = [
+            (Relation::In, &words.prepositions_in),
+            (Relation::On, &words.prepositions_on),
+            (Relation::Under, &words.prepositions_under),
+            (Relation::To, &words.prepositions),
+        ];
+        let mut readings: Vec<(Relation, usize)> = Vec::new();
+        for (relation, forms) in classes {
+            readings.extend(self.class(at, forms).into_iter().map(|end| (relation, end)));
+        }
+        keep_longest_first(&mut readings);
+        readings
+    }
+
+    fn ends_phrase(&self, at: usize) -> bool {
+        at >= self.tokens.len() || self.is_stop(at) || self.longest(at, &self.lexicon.words.connectors).is_some()
+    }
+
     /// All readings of a place without its preposition.
-    pub fn bare_places(&self, at: usize, depth: u32) -> Places {
+    pub fn bare_places(&self, at: usize, relation: Relation, depth: u32) -> Places {
         let mut readings = self.history(at, depth);
         readings.extend(self.middle(at, depth));
         readings.extend(self.spot_in_the_middle(at, depth));
         let things = self.noun_phrases(at, depth).into_iter();
-        readings.extend(things.map(|(phrase, end)| self.place(at, end, PlaceKind::On(phrase))));
+        readings.extend(things.map(|(phrase, end)| self.place(at, end, PlaceKind::At(phrase, relation))));
         keep_longest_first(&mut readings);
         readings
     }
@@ -56,7 +84,7 @@ impl Reader<'_> {
         let mut readings = Vec::new();
         for history in &self.lexicon.history {
             for (captures, end) in self.form(at, &history.form, &Captures::default(), depth + 1) {
-                let owner = captures.it.filter(|phrase| !phrase.pronoun);
+                let owner = captures.it.filter(|phrase| phrase.pronoun.is_none());
                 readings.push(self.place(at, end, PlaceKind::History(owner, history.reference)));
             }
         }
@@ -110,8 +138,8 @@ impl Reader<'_> {
         for (phrase, end) in self.noun_phrases(of, depth + 1) {
             readings.push(match phrase.quantity {
                 Quantity::Group => self.place(at, end, PlaceKind::Middle(Some(ungrouped(phrase)))),
-                _ if phrase.pronoun => continue,
-                _ => self.place(at, end, PlaceKind::On(phrase)),
+                _ if phrase.pronoun.is_some() => continue,
+                _ => self.place(at, end, PlaceKind::At(phrase, Relation::On)),
             });
         }
         readings
@@ -161,5 +189,5 @@ impl Reader<'_> {
 
 /// "the middle of all the mats" means the same group as "the middle of the mats".
 fn ungrouped(phrase: NounPhrase) -> NounPhrase {
-    NounPhrase { quantified: false, ..phrase }
+    NounPhrase { each: false, ..phrase }
 }

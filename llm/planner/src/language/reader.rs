@@ -1,21 +1,26 @@
 //! Matching of word classes and forms against the tokens, with the farthest failure kept for the report.
 
 use super::{
-    phrase::{NounPhrase, PlacePhrase},
+    phrase::Phrases,
+    syntax::{NounPhrase, PlaceKind, PlacePhrase, Relation, Statement},
     token::Token,
 };
 use crate::{
     lexicon::{Element, Form, Lexicon, Slot},
-    task::Span,
+    task::{Direction, Span},
 };
 use acm_concept::template::TemplateLibrary;
 use std::{
     cell::{Cell, RefCell},
-    collections::BTreeSet,
+    collections::{BTreeMap, BTreeSet},
 };
 
 /// Element matches that one instruction may cost: text that is so ambiguous is refused.
 const BUDGET: u32 = 400_000;
+/// Members of a list beyond the first.
+const MAX_LISTED: usize = 5;
+/// Words in which a list must come to its "and".
+const MAX_LIST_WORDS: usize = 16;
 /// Readings of one phrase that are kept.
 pub(super) const MAX_READINGS: usize = 24;
 
@@ -43,7 +48,13 @@ pub(super) struct Captures {
     pub object: Option<NounPhrase>,
     /// The object was named before the verb: its slot takes no words.
     pub object_given: bool,
+    /// More objects of the same clause.
+    pub also: Vec<NounPhrase>,
     pub place: Option<PlacePhrase>,
+    pub tool: Option<NounPhrase>,
+    pub condition: Option<Statement>,
+    pub side: Option<Direction>,
+    pub negated: bool,
     pub times: Option<u32>,
     pub it: Option<NounPhrase>,
 }
@@ -51,16 +62,33 @@ pub(super) struct Captures {
 /// Reads phrases from the tokens of one instruction.
 pub(super) struct Reader<'a> {
     pub lexicon: &'a Lexicon,
+    pub library: &'a TemplateLibrary,
     pub tokens: &'a [Token],
     pub nouns: BTreeSet<&'a str>,
     spent: Cell<u32>,
     failure: RefCell<Option<Failure>>,
+    /// Noun phrases by where they begin and how deep they stand: the same ones are asked for again and again.
+    phrases: RefCell<BTreeMap<(usize, u32), Phrases>>,
 }
 
 impl<'a> Reader<'a> {
     pub fn new(lexicon: &'a Lexicon, library: &'a TemplateLibrary, tokens: &'a [Token]) -> Reader<'a> {
         let nouns = library.iter().flat_map(|t| t.synopsis.nouns.iter().map(|noun| noun.noun.as_str())).collect();
-        Reader { lexicon, tokens, nouns, spent: Cell::new(0), failure: RefCell::new(None) }
+        Reader {
+            lexicon,
+            library,
+            tokens,
+            nouns,
+            spent: Cell::new(0),
+            failure: RefCell::default(),
+            phrases: RefCell::default(),
+        }
+    }
+    pub(super) fn phrases_known(&self, at: usize, depth: u32) -> Option<Phrases> {
+        self.phrases.borrow().get(&(at, depth)).cloned()
+    }
+    pub(super) fn know_phrases(&self, at: usize, depth: u32, phrases: &Phrases) {
+        self.phrases.borrow_mut().insert((at, depth), phrases.clone());
     }
     /// Whether the budget is used up.
     pub fn exhausted(&self) -> bool {
@@ -97,6 +125,9 @@ impl<'a> Reader<'a> {
     }
     pub fn is_word(&self, at: usize, word: &str) -> bool {
         self.word(at) == Some(word)
+    }
+    pub fn is_comma(&self, at: usize) -> bool {
+        self.tokens.get(at).is_some_and(|token| token.stop && token.text == ",")
     }
     pub fn is_stop(&self, at: usize) -> bool {
         self.tokens.get(at).is_some_and(|token| token.stop)
@@ -164,15 +195,52 @@ impl<'a> Reader<'a> {
         match slot {
             Slot::Object if captures.object_given => vec![(captures.clone(), at)],
             Slot::Object => {
+                let lists = self.noun_phrase_lists(at, depth).into_iter();
+                lists
+                    .map(|((first, also), end)| {
+                        with(&|c| (c.object, c.also) = (Some(first.clone()), also.clone()), end)
+                    })
+                    .collect()
+            }
+            Slot::Single if captures.object_given => vec![(captures.clone(), at)],
+            Slot::Single => {
                 let phrases = self.noun_phrases(at, depth).into_iter();
                 phrases.map(|(phrase, end)| with(&|c| c.object = Some(phrase.clone()), end)).collect()
             }
+            Slot::Tool => {
+                let phrases = self.noun_phrases(at, depth).into_iter();
+                phrases.map(|(phrase, end)| with(&|c| c.tool = Some(phrase.clone()), end)).collect()
+            }
+            Slot::Condition => {
+                let statements = self.conditions(at).into_iter();
+                statements.map(|(statement, end)| with(&|c| c.condition = Some(statement.clone()), end)).collect()
+            }
+            Slot::Side => {
+                let sides = self.meaning(at, &self.lexicon.directions).into_iter();
+                // "from left to right" begins at the first.
+                sides.map(|(side, end)| with(&|c| c.side = c.side.or(Some(side)), end)).collect()
+            }
+            Slot::Kind => self.kinds(at).into_iter().map(|end| (captures.clone(), end)).collect(),
+            Slot::Not => match self.longest(at, &self.lexicon.words.not) {
+                Some(end) => vec![with(&|c| c.negated = true, end)],
+                None => Vec::new(),
+            },
             Slot::Place => {
                 let places = self.places(at, depth).into_iter();
                 places.map(|(place, end)| with(&|c| c.place = Some(place.clone()), end)).collect()
             }
+            Slot::Towards => {
+                // "on the mat" says where a thing is that is taken, "to the mat" where it is taken to.
+                let directed = self.longest(at, &self.lexicon.words.directed).is_some();
+                let past = |place: &PlacePhrase| matches!(place.kind, PlaceKind::History(..));
+                let places = self.places(at, depth).into_iter();
+                places
+                    .filter(|(place, _)| directed || past(place))
+                    .map(|(place, end)| with(&|c| c.place = Some(place.clone()), end))
+                    .collect()
+            }
             Slot::Thing => {
-                let places = self.bare_places(at, depth).into_iter();
+                let places = self.bare_places(at, Relation::On, depth).into_iter();
                 places.map(|(place, end)| with(&|c| c.place = Some(place.clone()), end)).collect()
             }
             Slot::Times if captures.times.is_some() => Vec::new(),
@@ -190,6 +258,52 @@ impl<'a> Reader<'a> {
             }
             Slot::Spot => self.spots(at).into_iter().map(|end| (captures.clone(), end)).collect(),
         }
+    }
+    /// "the red cube, the blue one and the can".
+    pub(super) fn noun_phrase_lists(&self, at: usize, depth: u32) -> Vec<((NounPhrase, Vec<NounPhrase>), usize)> {
+        let mut lists: Vec<((NounPhrase, Vec<NounPhrase>), usize)> = Vec::new();
+        let mut open: Vec<((NounPhrase, Vec<NounPhrase>), usize)> =
+            self.noun_phrases(at, depth).into_iter().map(|(phrase, end)| ((phrase, Vec::new()), end)).collect();
+        for _ in 0..MAX_LISTED {
+            let mut longer = Vec::new();
+            for (list, end) in &open {
+                // Before a list is ended by "and", commas part its members.
+                let (comma, and) = (self.is_stop(*end), self.is_word(*end, "and"));
+                let start = if comma && self.is_word(end + 1, "and") { end + 2 } else { end + 1 };
+                if !(comma || and) || (comma && !self.list_goes_on(start)) {
+                    continue;
+                }
+                for (next, end) in self.noun_phrases(start, depth) {
+                    let mut list = list.clone();
+                    list.1.push(next);
+                    longer.push((list, end));
+                }
+            }
+            longer.truncate(MAX_READINGS);
+            lists.append(&mut open);
+            if longer.is_empty() {
+                break;
+            }
+            open = longer;
+        }
+        lists.append(&mut open);
+        lists.sort_by_key(|(_, end)| std::cmp::Reverse(*end));
+        lists.truncate(MAX_READINGS);
+        lists
+    }
+    /// Whether an "and" comes before the next verb: a comma may then stand between members of a list.
+    fn list_goes_on(&self, at: usize) -> bool {
+        let verb = |place: &usize| self.word(*place).is_some_and(|word| self.lexicon.verbs.contains_key(word));
+        (at.saturating_sub(1)..self.tokens.len().min(at + MAX_LIST_WORDS))
+            .take_while(|place| !verb(place))
+            .any(|place| self.is_word(place, "and"))
+    }
+    /// A noun or a word for a thing, with adjectives: it says nothing here.
+    fn kinds(&self, at: usize) -> Vec<usize> {
+        let at = self.skip_adjectives(at);
+        let mut ends = self.class(at, &self.lexicon.words.things);
+        ends.extend(self.noun(at).map(|noun| noun.end));
+        ends
     }
     /// "its", "the" or "the cube's".
     fn owners(&self, at: usize, depth: u32) -> Vec<(Option<NounPhrase>, usize)> {

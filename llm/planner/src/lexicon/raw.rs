@@ -19,7 +19,6 @@ struct RawWords {
     definite: Vec<String>,
     indefinite: Vec<String>,
     quantifiers: Vec<String>,
-    numerals: Vec<String>,
     pronouns: Vec<String>,
     things: Vec<String>,
     places: Vec<String>,
@@ -36,6 +35,33 @@ struct RawWords {
     between: Vec<String>,
     whole: Vec<String>,
     collectives: Vec<String>,
+    plural_pronouns: Vec<String>,
+    ones: Vec<String>,
+    several_ones: Vec<String>,
+    idle_adjectives: Vec<String>,
+    partitive: Vec<String>,
+    directed: Vec<String>,
+    packages: Vec<String>,
+    slices: Vec<String>,
+    several_slices: Vec<String>,
+    measures: Vec<String>,
+    twins: Vec<String>,
+    twin_links: Vec<String>,
+    containing: Vec<String>,
+    within_it: Vec<String>,
+    inside_it: Vec<String>,
+    that_you: Vec<String>,
+    last: Vec<String>,
+    not: Vec<String>,
+    prepositions_in: Vec<String>,
+    prepositions_on: Vec<String>,
+    prepositions_under: Vec<String>,
+    if_markers: Vec<String>,
+    unless_markers: Vec<String>,
+    otherwise: Vec<String>,
+    once_markers: Vec<String>,
+    there: Vec<String>,
+    counts: BTreeMap<String, u32>,
     directions: BTreeMap<Direction, Vec<String>>,
     beside: BTreeMap<String, Vec<String>>,
     sizes: RawSizes,
@@ -54,7 +80,45 @@ struct RawSizes {
 #[serde(deny_unknown_fields)]
 struct RawNouns {
     alias: Vec<RawAlias>,
+    #[serde(default)]
     plurals: BTreeMap<String, String>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawStates {
+    state: Vec<RawState>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawState {
+    predicate: String,
+    #[serde(default = "holds")]
+    holds: bool,
+    #[serde(default)]
+    said_of_moment: bool,
+    #[serde(default)]
+    adjectives: Vec<String>,
+    #[serde(default)]
+    forms: Vec<String>,
+}
+
+fn holds() -> bool {
+    true
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawModifiers {
+    modifier: Vec<RawModifier>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawModifier {
+    kind: ModifierKind,
+    forms: Vec<String>,
 }
 
 #[derive(Deserialize)]
@@ -99,6 +163,12 @@ struct RawFrame {
     name: String,
     goal: String,
     function: Option<String>,
+    predicate: Option<String>,
+    #[serde(default = "holds")]
+    holds: bool,
+    vary: Option<Variation>,
+    tool_state: Option<String>,
+    into: Option<String>,
     #[serde(default)]
     said_of_object: bool,
     verbs: Vec<String>,
@@ -132,6 +202,9 @@ pub(super) fn parse(files: &BTreeMap<String, String>) -> Result<Lexicon, Lexicon
     let colors: RawColors = read(files, "colors.toml")?;
     let verbs: RawVerbs = read(files, "verbs.toml")?;
     let history: RawHistory = read(files, "history.toml")?;
+    let household: RawNouns = read(files, "household.toml")?;
+    let states: RawStates = read(files, "states.toml")?;
+    let modifiers: RawModifiers = read(files, "modifiers.toml")?;
 
     let frames = verbs.frame.iter().map(frame).collect::<Result<Vec<_>, _>>()?;
     let mut history_forms = Vec::new();
@@ -149,8 +222,11 @@ pub(super) fn parse(files: &BTreeMap<String, String>) -> Result<Lexicon, Lexicon
         words: closed_classes(&words)?,
         colors: colors.color.iter().map(color).collect::<Result<_, _>>()?,
         shades: colors.shade.iter().map(|s| Ok((s.lightness, phrases(&s.words)?))).collect::<Result<_, _>>()?,
-        aliases: nouns.alias.iter().flat_map(|a| a.words.iter().map(|w| (w.clone(), a.noun.clone()))).collect(),
-        plurals: nouns.plurals,
+        counts: numbers(&words.counts)?,
+        states: states.state.iter().map(state).collect::<Result<_, _>>()?,
+        modifiers: modifier_forms(&modifiers)?,
+        aliases: aliases(nouns.alias.iter().chain(&household.alias)),
+        plurals: nouns.plurals.into_iter().chain(household.plurals).collect(),
         verbs: verb_forms(&verbs),
         frames,
         history: history_forms,
@@ -179,7 +255,6 @@ fn closed_classes(raw: &RawWords) -> Result<Words, LexiconError> {
         definite: phrases(&raw.definite)?,
         indefinite: phrases(&raw.indefinite)?,
         quantifiers: phrases(&raw.quantifiers)?,
-        numerals: phrases(&raw.numerals)?,
         pronouns: phrases(&raw.pronouns)?,
         things: phrases(&raw.things)?,
         places: phrases(&raw.places)?,
@@ -196,7 +271,77 @@ fn closed_classes(raw: &RawWords) -> Result<Words, LexiconError> {
         between: phrases(&raw.between)?,
         whole: phrases(&raw.whole)?,
         collectives: phrases(&raw.collectives)?,
+        plural_pronouns: phrases(&raw.plural_pronouns)?,
+        ones: phrases(&raw.ones)?,
+        several_ones: phrases(&raw.several_ones)?,
+        idle_adjectives: phrases(&raw.idle_adjectives)?,
+        partitive: phrases(&raw.partitive)?,
+        directed: phrases(&raw.directed)?,
+        packages: phrases(&raw.packages)?,
+        slices: phrases(&raw.slices)?,
+        several_slices: phrases(&raw.several_slices)?,
+        measures: phrases(&raw.measures)?,
+        twins: phrases(&raw.twins)?,
+        twin_links: phrases(&raw.twin_links)?,
+        containing: phrases(&raw.containing)?,
+        within_it: phrases(&raw.within_it)?,
+        inside_it: phrases(&raw.inside_it)?,
+        that_you: phrases(&raw.that_you)?,
+        last: phrases(&raw.last)?,
+        not: phrases(&raw.not)?,
+        prepositions_in: phrases(&raw.prepositions_in)?,
+        prepositions_on: phrases(&raw.prepositions_on)?,
+        prepositions_under: phrases(&raw.prepositions_under)?,
+        if_markers: phrases(&raw.if_markers)?,
+        unless_markers: phrases(&raw.unless_markers)?,
+        otherwise: phrases(&raw.otherwise)?,
+        once_markers: phrases(&raw.once_markers)?,
+        there: phrases(&raw.there)?,
     })
+}
+
+fn aliases<'a>(entries: impl Iterator<Item = &'a RawAlias>) -> BTreeMap<String, Vec<String>> {
+    let mut aliases: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    for alias in entries {
+        for word in &alias.words {
+            let nouns = aliases.entry(word.clone()).or_default();
+            if !nouns.contains(&alias.noun) {
+                nouns.push(alias.noun.clone());
+            }
+        }
+    }
+    aliases
+}
+
+/// A form of a state; behind the verb of "the lid is open" there may be a "not".
+fn state(raw: &RawState) -> Result<StateWords, LexiconError> {
+    let mut forms = Vec::with_capacity(raw.forms.len());
+    for text in &raw.forms {
+        let mut read = form("states.toml", text)?;
+        let subject_first = matches!(read.first(), Some(Element::Slot { slot: Slot::It, .. }));
+        let copula = matches!(read.get(1), Some(Element::Words { any, .. }) if any.iter().any(|word| word == "is"));
+        if subject_first && copula {
+            read.insert(2, Element::Slot { slot: Slot::Not, optional: true });
+        }
+        forms.push(read);
+    }
+    Ok(StateWords {
+        predicate: raw.predicate.clone(),
+        holds: raw.holds,
+        said_of_moment: raw.said_of_moment,
+        adjectives: phrases(&raw.adjectives)?,
+        forms,
+    })
+}
+
+fn modifier_forms(raw: &RawModifiers) -> Result<Vec<ModifierForm>, LexiconError> {
+    let mut forms = Vec::new();
+    for modifier in &raw.modifier {
+        for text in &modifier.forms {
+            forms.push(ModifierForm { kind: modifier.kind, form: form("modifiers.toml", text)? });
+        }
+    }
+    Ok(forms)
 }
 
 fn frame(raw: &RawFrame) -> Result<Frame, LexiconError> {
@@ -205,24 +350,32 @@ fn frame(raw: &RawFrame) -> Result<Frame, LexiconError> {
         form: raw.name.clone(),
         reason: reason.to_owned(),
     };
-    let goal = match (raw.goal.as_str(), &raw.function) {
-        ("at", None) => FrameGoal::At,
-        ("exchange", None) => FrameGoal::Exchange,
-        ("holding", None) => FrameGoal::Holding(true),
-        ("not-holding", None) => FrameGoal::Holding(false),
-        ("performed", Some(function)) => FrameGoal::Performed(function.clone()),
-        ("nothing", None) => FrameGoal::Nothing,
-        ("performed", None) => return Err(wrong("has the goal `performed` and names no function")),
+    let goal = match (raw.goal.as_str(), &raw.function, &raw.predicate, raw.vary) {
+        ("at", None, None, None) => FrameGoal::At,
+        ("exchange", None, None, None) => FrameGoal::Exchange,
+        ("holding", None, None, None) => FrameGoal::Holding(raw.holds),
+        ("performed", Some(function), None, None) => FrameGoal::Performed(function.clone()),
+        ("state", None, Some(predicate), None) => FrameGoal::State(predicate.clone(), raw.holds),
+        ("find", None, None, Some(vary)) => FrameGoal::Find(vary),
+        ("await", None, None, None) => FrameGoal::Await,
+        ("nothing", None, None, None) => FrameGoal::Nothing,
         _ => {
             return Err(wrong(
-                "needs one of the goals at, exchange, holding, not-holding, performed, nothing; only `performed` has a function",
+                "needs one of the goals at, exchange, holding, performed, state, find, await, nothing; `performed` names a `function`, `state` a `predicate`, `find` what it does `vary`, and no other does",
             ));
         }
     };
     let read =
         |raw: &RawForm| Ok(FrameForm { form: form("verbs.toml", &raw.form)?, history: raw.history, times: raw.times });
     let forms = raw.forms.iter().map(read).collect::<Result<_, _>>()?;
-    Ok(Frame { name: raw.name.clone(), goal, said_of_object: raw.said_of_object, forms })
+    Ok(Frame {
+        name: raw.name.clone(),
+        goal,
+        said_of_object: raw.said_of_object,
+        tool_state: raw.tool_state.clone(),
+        into: raw.into.clone(),
+        forms,
+    })
 }
 
 fn verb_forms(raw: &RawVerbs) -> BTreeMap<String, Vec<usize>> {
@@ -319,10 +472,16 @@ fn slot(name: &str) -> Option<Slot> {
         "object" => Slot::Object,
         "place" => Slot::Place,
         "thing" => Slot::Thing,
+        "towards" => Slot::Towards,
         "times" => Slot::Times,
         "it" => Slot::It,
         "its" => Slot::Its,
         "spot" => Slot::Spot,
+        "single" => Slot::Single,
+        "tool" => Slot::Tool,
+        "condition" => Slot::Condition,
+        "side" => Slot::Side,
+        "kind" => Slot::Kind,
         _ => return None,
     })
 }
@@ -341,7 +500,6 @@ fn known_words(lexicon: &Lexicon) -> BTreeSet<String> {
         &w.definite,
         &w.indefinite,
         &w.quantifiers,
-        &w.numerals,
         &w.pronouns,
         &w.things,
         &w.places,
@@ -359,6 +517,32 @@ fn known_words(lexicon: &Lexicon) -> BTreeSet<String> {
         &w.whole,
         &w.collectives,
         &w.earlier_markers,
+        &w.plural_pronouns,
+        &w.ones,
+        &w.several_ones,
+        &w.idle_adjectives,
+        &w.partitive,
+        &w.directed,
+        &w.packages,
+        &w.slices,
+        &w.several_slices,
+        &w.measures,
+        &w.twins,
+        &w.twin_links,
+        &w.containing,
+        &w.within_it,
+        &w.inside_it,
+        &w.that_you,
+        &w.last,
+        &w.not,
+        &w.prepositions_in,
+        &w.prepositions_on,
+        &w.prepositions_under,
+        &w.if_markers,
+        &w.unless_markers,
+        &w.otherwise,
+        &w.once_markers,
+        &w.there,
     ];
     let classes = closed.into_iter().flatten();
     let directions = lexicon.directions.iter().flat_map(|(_, forms)| forms);
@@ -366,7 +550,9 @@ fn known_words(lexicon: &Lexicon) -> BTreeSet<String> {
     let sizes = lexicon.sizes.iter().flat_map(|(_, forms)| forms);
     let colors = lexicon.colors.iter().flat_map(|(_, forms)| forms);
     let shades = lexicon.shades.iter().flat_map(|(_, forms)| forms);
-    let numbers = lexicon.ordinals.iter().chain(&lexicon.times).map(|(_, form)| form);
+    let states = lexicon.states.iter().flat_map(|state| state.adjectives.iter().chain(&state.forms));
+    let modifiers = lexicon.modifiers.iter().map(|modifier| &modifier.form);
+    let numbers = lexicon.ordinals.iter().chain(&lexicon.times).chain(&lexicon.counts).map(|(_, form)| form);
     let history = lexicon.history.iter().map(|history| &history.form);
     let frames = lexicon.frames.iter().flat_map(|frame| frame.forms.iter().map(|form| &form.form));
     let forms = classes
@@ -376,6 +562,8 @@ fn known_words(lexicon: &Lexicon) -> BTreeSet<String> {
         .chain(colors)
         .chain(shades)
         .chain(numbers)
+        .chain(states)
+        .chain(modifiers)
         .chain(history)
         .chain(frames);
     let mut known: BTreeSet<String> = lexicon.verbs.keys().cloned().collect();

@@ -61,8 +61,10 @@ impl Numbers {
                 };
                 format!("{function}({object}) {often}")
             }
-            Goal::State { predicate, object, holds } => {
-                format!("{}{predicate}({})", if *holds { "" } else { "not " }, self.of(*object))
+            Goal::State { predicate, object, holds, by } => {
+                let object = self.of(*object);
+                let by = by.map(|by| format!(" by {}", self.of(by))).unwrap_or_default();
+                format!("{}{predicate}({object}){by}", if *holds { "" } else { "not " })
             }
             Goal::Each { members, order, body } => {
                 let members = self.of(*members);
@@ -148,8 +150,10 @@ impl Task {
                 Times::Shown(by) => format!("{function} {} as often as {} shows", name(object), name(by)),
                 Times::Until(until) => format!("{function} {} until {}", name(object), self.describe_condition(until)),
             },
-            Goal::State { predicate, object, holds: true } => format!("{} is {predicate}", name(object)),
-            Goal::State { predicate, object, holds: false } => format!("{} is not {predicate}", name(object)),
+            Goal::State { predicate, object, holds, by } => {
+                let by = by.map(|by| format!(" by {}", self.name(by))).unwrap_or_default();
+                format!("{} is {}{predicate}{by}", name(object), if *holds { "" } else { "not " })
+            }
             Goal::Each { members, order, body } => {
                 let order = match order {
                     Ordering::Any => String::new(),

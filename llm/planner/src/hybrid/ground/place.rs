@@ -35,9 +35,9 @@ impl Grounding<'_> {
             return None;
         };
         Some(match kind {
-            PlaceKind::On => Destination::On { reference: self.one(&field, thing, &Role::Affordance(SUPPORTIVE))? },
-            PlaceKind::In => Destination::In { reference: self.one(&field, thing, &Role::Affordance(CONTAINS))? },
-            PlaceKind::Under => Destination::Under { reference: self.one(&field, thing, &Role::Mentioned)? },
+            PlaceKind::On => Destination::On { reference: self.thing(&field, thing, &Role::Affordance(SUPPORTIVE))? },
+            PlaceKind::In => Destination::In { reference: self.thing(&field, thing, &Role::Affordance(CONTAINS))? },
+            PlaceKind::Under => Destination::Under { reference: self.thing(&field, thing, &Role::Mentioned)? },
             PlaceKind::Beside => {
                 Destination::Beside { reference: self.thing(&field, thing, &Role::Mentioned)?, side: form.side }
             }

@@ -96,7 +96,11 @@ impl Grounding<'_> {
                 };
                 let predicate = self.predicate(&format!("{place}/state"), &state.predicate)?;
                 let object = self.acted_on(&object, form, thing, &Role::Effect(predicate.clone()))?;
-                Goal::State { predicate, object, holds: state.holds }
+                let by = match form.by {
+                    Some(by) => Some(self.thing(&format!("{place}/by"), by, &Role::Mentioned)?),
+                    None => None,
+                };
+                Goal::State { predicate, object, holds: state.holds, by }
             }
             GoalForm::At => {
                 let object = self.acted_on(&object, form, thing, &Role::Effect("at".into()))?;
@@ -104,6 +108,12 @@ impl Grounding<'_> {
                     self.fault(&format!("{place}/to"), "goal `at` needs a place");
                     return None;
                 };
+                // Within a step for each of a group the group stands for the one whose turn it is.
+                if let (None, Some(thing), PlaceKind::On | PlaceKind::In | PlaceKind::Under) =
+                    (form.part_of, to.thing, to.kind)
+                {
+                    self.one(&format!("{place}/to/thing"), thing, &Role::Mentioned)?;
+                }
                 let half = second.get(index).copied().flatten();
                 if to.kind == PlaceKind::InPlaceOf && half.is_none() {
                     let reason = "two things that change places are two steps in a row, each in-place-of the other";
@@ -162,12 +172,13 @@ impl Grounding<'_> {
     /// Fields that say nothing with the goal of a step.
     fn unused(&mut self, place: &str, form: &StepForm) {
         use GoalForm::{At, Await, Each, Find, Performed, State};
-        let fields: [(&str, bool, &[GoalForm]); 9] = [
+        let fields: [(&str, bool, &[GoalForm]); 10] = [
             ("to", form.to.is_some(), &[At, Find]),
             ("function", form.function.is_some(), &[Performed]),
             ("times", form.times.is_some(), &[Performed]),
             ("times_shown_by", form.times_shown_by.is_some(), &[Performed]),
             ("state", form.state.is_some(), &[State]),
+            ("by", form.by.is_some(), &[State]),
             ("order_from", form.order_from.is_some(), &[Each]),
             ("order_named", !form.order_named.is_empty(), &[Each]),
             ("vary", form.vary.is_some(), &[Find]),

@@ -1,0 +1,294 @@
+//! Goals of clauses, for one thing, for several one after the other, and for two that change places.
+
+use super::{Interpretation, several};
+use crate::{
+    language::{
+        ParseError,
+        role::Role,
+        syntax::{Clause, NounPhrase, PlaceKind, PlacePhrase},
+    },
+    lexicon::{FrameGoal, ModifierKind},
+    task::{Destination, Goal, ObjectReference, Ordering, Quantity, ReferenceIndex, Span, Times},
+};
+
+impl Interpretation<'_> {
+    /// All goals of a clause, in order.
+    pub(super) fn goals(&mut self, clause: &Clause) -> Result<Vec<Goal>, ParseError> {
+        match &clause.goal {
+            FrameGoal::Exchange => return self.exchange(clause),
+            FrameGoal::Find(vary) => return Ok(vec![self.trial(clause, *vary)?]),
+            FrameGoal::Await => {
+                let statement = clause.condition.as_ref();
+                let statement = statement.ok_or_else(|| self.unsupported(clause.span, "it does not say for what"))?;
+                let condition = self.condition(statement)?;
+                return Ok(vec![Goal::Await { condition }]);
+            }
+            _ => {}
+        }
+        let objects = self.objects(clause)?;
+        let named = clause.modifier(ModifierKind::ThatOrder);
+        if let (Some(_), [first, _, ..]) = (named, objects.as_slice())
+            && let Some(members) = self.group_like(*first)
+        {
+            let mut body = self.body(clause, members)?;
+            let order = Ordering::Named(objects);
+            return Ok(vec![Goal::Each { members, order, body: std::mem::take(&mut body) }]);
+        }
+        if let Some(modifier) = named.filter(|_| objects.len() < 2) {
+            return Err(self.unsupported(modifier.span, "no order of several things was named"));
+        }
+        let mut goals = Vec::new();
+        for object in objects {
+            let body = self.body(clause, object)?;
+            let side = clause.modifier(ModifierKind::From).and_then(|modifier| modifier.side);
+            if self.quantity_several(object) {
+                let order = side.map_or(Ordering::Any, Ordering::From);
+                goals.push(Goal::Each { members: object, order, body });
+            } else if let Some(modifier) = clause.modifier(ModifierKind::From) {
+                return Err(self.unsupported(modifier.span, "one thing has no order"));
+            } else {
+                goals.extend(body);
+            }
+        }
+        Ok(goals)
+    }
+
+    /// The goal of a clause about one thing.
+    pub(super) fn single_goal(&mut self, clause: &Clause) -> Result<Goal, ParseError> {
+        match <[Goal; 1]>::try_from(self.goals(clause)?) {
+            Ok([goal]) => Ok(goal),
+            Err(_) => Err(self.unsupported(clause.span, "one thing is to be done to try")),
+        }
+    }
+
+    fn role_of(clause: &Clause) -> Role {
+        match &clause.goal {
+            FrameGoal::Holding(_) => Role::Effect("holding".into()),
+            FrameGoal::Performed(function) => Role::Function(function.clone()),
+            FrameGoal::State(predicate, _) => Role::Effect(predicate.clone()),
+            _ => Role::Effect("at".into()),
+        }
+    }
+
+    /// What a clause is about.
+    fn objects(&mut self, clause: &Clause) -> Result<Vec<ReferenceIndex>, ParseError> {
+        let role = Self::role_of(clause);
+        let Some(first) = &clause.object else {
+            return match self.antecedent(clause.span, &role) {
+                Err(ParseError::NoAntecedent { .. }) if matches!(role, Role::Function(_)) => {
+                    Ok(vec![self.unnamed(clause.span, &role)])
+                }
+                found => found.map(|index| vec![index]),
+            };
+        };
+        let mut objects = Vec::new();
+        for phrase in std::iter::once(first).chain(&clause.also) {
+            if phrase.pronoun == Some(super::super::syntax::Pronoun::Several) {
+                objects.extend(self.antecedents(phrase.span, &role)?);
+            } else if let Some(carrier) = self.carrier_meant(phrase, clause) {
+                objects.push(carrier);
+            } else {
+                objects.push(self.reference(phrase, &role)?);
+            }
+        }
+        Ok(objects)
+    }
+
+    /// "Put the fork in the mug and put it on the table": what was filled goes on with what is in it.
+    fn carrier_meant(&self, phrase: &NounPhrase, clause: &Clause) -> Option<ReferenceIndex> {
+        let history =
+            matches!(clause.place, Some(PlacePhrase { kind: PlaceKind::History(..), .. })) || clause.place.is_none();
+        if phrase.pronoun.is_none() || history || clause.goal != FrameGoal::At {
+            return None;
+        }
+        match &self.drafts.last()?.subtask.goal {
+            Goal::At { destination: Destination::In { reference }, .. } => {
+                let noun = self.references.get(*reference)?.noun.as_deref();
+                Role::Effect("at".into()).fits(self.library, noun).then_some(*reference)
+            }
+            _ => None,
+        }
+    }
+
+    /// A thing that the verb alone asks for: "press".
+    fn unnamed(&mut self, span: Span, role: &Role) -> ReferenceIndex {
+        let mut reference = ObjectReference {
+            phrase: span.of(self.text).into(),
+            span,
+            subtask: 0,
+            quantity: Quantity::TheOne,
+            noun: None,
+            function: None,
+            affordance: None,
+            color: None,
+            size: None,
+            rank: None,
+            free: false,
+            located: None,
+            other_than: Vec::new(),
+            part_of: None,
+            twin_of: None,
+            contains: Vec::new(),
+            states: Vec::new(),
+            handled: None,
+        };
+        super::reference::require(&mut reference, role, self.library);
+        self.references.push(reference);
+        self.references.len() - 1
+    }
+
+    /// What is done with one object.
+    fn body(&mut self, clause: &Clause, object: ReferenceIndex) -> Result<Vec<Goal>, ParseError> {
+        Ok(match &clause.goal {
+            FrameGoal::Holding(held) => {
+                let mut goals = vec![Goal::Holding { object, held: *held }];
+                goals.extend(self.tool_state(clause)?);
+                goals
+            }
+            FrameGoal::Performed(function) => {
+                let times = self.times(clause)?;
+                vec![Goal::Performed { function: function.clone(), object, times }]
+            }
+            FrameGoal::State(predicate, holds) => {
+                let by = match &clause.tool {
+                    Some(tool) => Some(self.reference(tool, &Role::Mentioned)?),
+                    None => None,
+                };
+                vec![Goal::State { predicate: predicate.clone(), object, holds: *holds, by }]
+            }
+            _ => {
+                let destination = match (&clause.place, clause.history) {
+                    (Some(place), _) => self.destination(place, Some(object))?,
+                    (None, Some(reference)) => Destination::History { object, reference },
+                    (None, None) => self.own_destination(clause)?,
+                };
+                if destination.references() == [object] && !matches!(destination, Destination::History { .. }) {
+                    return Err(self.unsupported(clause.span, "nothing can be put where it is itself the place"));
+                }
+                vec![Goal::At { object, destination }]
+            }
+        })
+    }
+
+    fn tool_state(&mut self, clause: &Clause) -> Result<Option<Goal>, ParseError> {
+        let state = self.lexicon.frames.get(clause.frame).and_then(|frame| frame.tool_state.clone());
+        let (Some(predicate), Some(tool)) = (state, &clause.tool) else { return Ok(None) };
+        let object = self.reference(tool, &Role::Effect(predicate.clone()))?;
+        Ok(Some(Goal::State { predicate, object, holds: true, by: None }))
+    }
+
+    /// Where a verb that says it itself has the object go.
+    fn own_destination(&mut self, clause: &Clause) -> Result<Destination, ParseError> {
+        let into = self.lexicon.frames.get(clause.frame).and_then(|frame| frame.into.clone());
+        let Some(noun) = into else { return Err(self.unsupported(clause.span, "it does not say where to")) };
+        if self.library.with_noun(&noun).next().is_none() {
+            return Err(self.unsupported(clause.span, &format!("I know no {noun} to put it in")));
+        }
+        let named = self.references.iter().rposition(|known| known.noun.as_deref() == Some(noun.as_str()));
+        let reference = named.unwrap_or_else(|| {
+            let index = self.unnamed(clause.span, &Role::Affordance(crate::language::CONTAINS));
+            if let Some(reference) = self.references.get_mut(index) {
+                (reference.noun, reference.quantity) = (Some(noun), Quantity::AnyOne);
+            }
+            index
+        });
+        Ok(Destination::In { reference })
+    }
+
+    fn times(&mut self, clause: &Clause) -> Result<Times, ParseError> {
+        if let Some(modifier) = clause.modifier(ModifierKind::Shown)
+            && let Some(thing) = &modifier.thing
+        {
+            return Ok(Times::Shown(self.reference(thing, &Role::Mentioned)?));
+        }
+        if let Some(modifier) = clause.modifier(ModifierKind::Until)
+            && let Some(statement) = &modifier.condition
+        {
+            return Ok(Times::Until(self.condition(statement)?));
+        }
+        Ok(Times::Count(clause.times.unwrap_or(1)))
+    }
+
+    /// "Swap the cube and the can": each goes to where the other stood. "Swap the two cubes": one and the other.
+    fn exchange(&mut self, clause: &Clause) -> Result<Vec<Goal>, ParseError> {
+        let role = Role::Effect("at".into());
+        let heading = clause.modifier(ModifierKind::TakesHeading).is_some();
+        let (one, other) = match (&clause.object, &clause.place) {
+            (Some(object), Some(PlacePhrase { kind: PlaceKind::At(other, _), .. })) => {
+                (self.reference(object, &role)?, self.reference(other, &role)?)
+            }
+            (None, Some(PlacePhrase { kind: PlaceKind::At(other, _), .. })) => {
+                (self.antecedent(clause.span, &role)?, self.reference(other, &role)?)
+            }
+            (Some(object), None) => match clause.also.as_slice() {
+                [] => self.two_of_a_group(object, &role)?,
+                [other] => (self.reference(object, &role)?, self.reference(other, &role)?),
+                _ => return Err(self.unsupported(clause.span, "two things change places, no more")),
+            },
+            _ => return Err(self.unsupported(clause.span, "it does not say with what")),
+        };
+        let group = |index: ReferenceIndex| self.references.get(index).is_some_and(several);
+        if one == other || group(one) || group(other) {
+            return Err(self.unsupported(clause.span, "two things that can be told apart change places, no more"));
+        }
+        let goal =
+            |object, with, first| Goal::At { object, destination: Destination::Exchanged { with, first, heading } };
+        Ok(vec![goal(one, other, true), goal(other, one, false)])
+    }
+
+    /// Any one of a group of two, and the other.
+    fn two_of_a_group(
+        &mut self,
+        phrase: &NounPhrase,
+        role: &Role,
+    ) -> Result<(ReferenceIndex, ReferenceIndex), ParseError> {
+        if !phrase.several() || phrase.pronoun.is_some() {
+            return Err(self.unsupported(phrase.span, "it does not say with what"));
+        }
+        let one = NounPhrase { quantity: Quantity::AnyOne, each: false, ..phrase.clone() };
+        let one = self.reference(&one, role)?;
+        let other = NounPhrase { quantity: Quantity::TheOne, each: false, other: true, ..phrase.clone() };
+        let other = self.fresh(&other, role, vec![one])?;
+        Ok((one, other))
+    }
+
+    /// "parking each lid behind its cube" after something was done with each cube: it is done in the same turn, with
+    /// the lid that is on the cube then.
+    pub(super) fn belongs_together(&mut self, clause: &Clause) -> Result<bool, ParseError> {
+        let (Some(object), Some(PlacePhrase { kind, .. })) = (&clause.object, &clause.place) else { return Ok(false) };
+        let (PlaceKind::Beside(owner, _) | PlaceKind::At(owner, _)) = kind else { return Ok(false) };
+        if !(owner.its && object.each) {
+            return Ok(false);
+        }
+        let Some(Goal::Each { members, .. }) = self.drafts.last().map(|draft| draft.subtask.goal.clone()) else {
+            return Err(self.unsupported(owner.span, "I do not know which belongs to which"));
+        };
+        let same = self.references.get(members).is_some_and(|group| group.noun == owner.noun);
+        if !same {
+            return Err(self.unsupported(owner.span, "it is not what the clause before is about"));
+        }
+        let mine = NounPhrase { quantity: Quantity::TheOne, each: false, ..object.clone() };
+        let mine = self.fresh(&mine, &Role::Effect("at".into()), Vec::new())?;
+        if let Some(reference) = self.references.get_mut(mine) {
+            reference.located = Some(Box::new(Destination::On { reference: members }));
+        }
+        let destination = match kind {
+            PlaceKind::Beside(_, side) => Destination::Beside { reference: members, side: *side },
+            _ => Destination::On { reference: members },
+        };
+        if let Some(draft) = self.drafts.last_mut()
+            && let Goal::Each { body, .. } = &mut draft.subtask.goal
+        {
+            body.push(Goal::At { object: mine, destination });
+            draft.subtask.span = draft.subtask.span.join(clause.span);
+            draft.subtask.text = draft.subtask.span.of(self.text).into();
+        }
+        Ok(true)
+    }
+
+    /// A group named before of which a thing is a member by its noun.
+    fn group_like(&self, member: ReferenceIndex) -> Option<ReferenceIndex> {
+        let noun = self.references.get(member)?.noun.clone()?;
+        self.references.iter().rposition(|known| several(known) && known.noun.as_ref() == Some(&noun))
+    }
+}

@@ -1,0 +1,294 @@
+//! From phrases to goals: references are joined, pronouns find what they stand for, clauses get their order.
+
+mod condition;
+mod goal;
+mod place;
+mod reference;
+
+use super::{
+    ParseError,
+    role::Role,
+    syntax::{Clause, Guard, Modifier, Order, Sentence},
+};
+use crate::{
+    lexicon::{FrameGoal, Lexicon, ModifierKind},
+    task::{
+        Condition, Destination, Goal, Manner, MannerKind, ObjectReference, Ordering, ReferenceIndex, Span, Subtask,
+        Task, Times,
+    },
+};
+use acm_concept::template::TemplateLibrary;
+
+/// Joins sentences to a task.
+pub(super) fn interpret(
+    lexicon: &Lexicon,
+    library: &TemplateLibrary,
+    text: &str,
+    sentences: &[Sentence],
+) -> Result<Task, ParseError> {
+    let mut reading =
+        Interpretation { lexicon, library, text, references: Vec::new(), drafts: Vec::new(), manners: Vec::new() };
+    let mut untouched = Vec::new();
+    for sentence in sentences {
+        match sentence {
+            Sentence::Do { clause, order, background, guard } => {
+                reading.add(clause, *order, *background, guard.as_deref())?;
+            }
+            Sentence::Leave { object } => untouched.push(reading.reference(object, &Role::Mentioned)?),
+            Sentence::There { things } => {
+                for thing in things {
+                    reading.reference(thing, &Role::Mentioned)?;
+                }
+            }
+            Sentence::Once { condition, trails } => reading.once(condition, *trails)?,
+            Sentence::Manner { modifier } => reading.manner(modifier)?,
+        }
+    }
+    if reading.drafts.is_empty() {
+        return Err(ParseError::Empty);
+    }
+    reading.drop_parts_of_moves();
+    let Interpretation { drafts, mut references, manners, .. } = reading;
+    let subtasks = judged_together(drafts);
+    settle_subtasks(&subtasks, &mut references);
+    let nouns = nouns_of(&references);
+    Ok(Task { instruction: text.into(), subtasks, references, untouched, nouns, manners })
+}
+
+/// A subtask with the number of the "if" on which it hangs.
+struct Draft {
+    subtask: Subtask,
+    guard: Option<usize>,
+}
+
+struct Interpretation<'a> {
+    lexicon: &'a Lexicon,
+    library: &'a TemplateLibrary,
+    text: &'a str,
+    references: Vec<ObjectReference>,
+    drafts: Vec<Draft>,
+    manners: Vec<Manner>,
+}
+
+impl Interpretation<'_> {
+    fn add(
+        &mut self,
+        clause: &Clause,
+        order: Order,
+        background: bool,
+        guard: Option<&Guard>,
+    ) -> Result<(), ParseError> {
+        if clause.goal == FrameGoal::Nothing {
+            return self.mention(clause);
+        }
+        let when = match guard {
+            Some(guard) => {
+                let condition = self.condition(&guard.condition)?;
+                Some(Condition { negated: condition.negated ^ guard.otherwise, ..condition })
+            }
+            None => self.own_condition(clause)?,
+        };
+        if clause.modifier(ModifierKind::EachTry).is_some() || self.tries(clause) {
+            return self.probe(clause);
+        }
+        if self.belongs_together(clause)? {
+            return Ok(());
+        }
+        let goals = self.goals(clause)?;
+        if background
+            && goals.iter().all(|goal| self.drafts.iter().any(|d| same_but_times(&d.subtask.goal, goal, clause)))
+        {
+            return Ok(());
+        }
+        let at = self.place_in_order(order);
+        let guard = guard.map(|guard| guard.number);
+        let drafts = goals.into_iter().map(|goal| {
+            let subtask = Subtask { when: when.clone(), ..self.subtask(clause.span, goal) };
+            Draft { subtask, guard }
+        });
+        let drafts: Vec<Draft> = drafts.collect();
+        self.drafts.splice(at..at, drafts);
+        for modifier in &clause.modifiers {
+            self.manner_of(modifier)?;
+        }
+        Ok(())
+    }
+
+    fn subtask(&self, span: Span, goal: Goal) -> Subtask {
+        Subtask { text: span.of(self.text).into(), span, goal, when: None }
+    }
+
+    /// Where the next subtask belongs. The two halves of an exchange are never parted.
+    fn place_in_order(&self, order: Order) -> usize {
+        let second_half = |draft: &Draft| {
+            matches!(draft.subtask.goal, Goal::At { destination: Destination::Exchanged { first: false, .. }, .. })
+        };
+        let of_last = if self.drafts.last().is_some_and(second_half) { 2 } else { 1 };
+        match order {
+            Order::Last => self.drafts.len(),
+            Order::BeforeLast => self.drafts.len().saturating_sub(of_last),
+        }
+    }
+
+    /// Keeps the things of a clause without a goal for later pronouns.
+    fn mention(&mut self, clause: &Clause) -> Result<(), ParseError> {
+        for phrase in clause.object.iter().chain(&clause.also) {
+            self.reference(phrase, &Role::Mentioned)?;
+        }
+        Ok(())
+    }
+
+    /// A manner in a clause of its own.
+    fn manner(&mut self, modifier: &Modifier) -> Result<(), ParseError> {
+        let last = self.drafts.last_mut().map(|draft| &mut draft.subtask.goal);
+        match (modifier.kind, last) {
+            (ModifierKind::TakesHeading, Some(_)) => self.take_heading(modifier.span),
+            (ModifierKind::From, Some(Goal::Each { order: order @ Ordering::Any, .. })) => {
+                if let Some(side) = modifier.side {
+                    *order = Ordering::From(side);
+                }
+                Ok(())
+            }
+            (ModifierKind::Until, Some(Goal::Find { sign: None, .. })) => self.sign(modifier),
+            (
+                ModifierKind::OneAtATime | ModifierKind::OneToAPlace | ModifierKind::Aside | ModifierKind::TakesPlace,
+                _,
+            ) => self.manner_of(modifier),
+            _ => {
+                Err(self
+                    .unsupported(modifier.span, "it says how to do something, and nothing before it can be done so"))
+            }
+        }
+    }
+
+    /// What a modifier says of the way of doing it.
+    fn manner_of(&mut self, modifier: &Modifier) -> Result<(), ParseError> {
+        let kind = match modifier.kind {
+            ModifierKind::OneAtATime => MannerKind::OneAtATime,
+            ModifierKind::OneToAPlace => MannerKind::OneToAPlace,
+            ModifierKind::Aside => match &modifier.thing {
+                Some(thing) => MannerKind::Aside(self.reference(thing, &Role::Mentioned)?),
+                None => return Ok(()),
+            },
+            ModifierKind::TakesHeading => return self.take_heading(modifier.span),
+            _ => return Ok(()),
+        };
+        self.manners.push(Manner { span: modifier.span, kind });
+        Ok(())
+    }
+
+    /// An exchange of headings too.
+    fn take_heading(&mut self, span: Span) -> Result<(), ParseError> {
+        let mut taken = false;
+        for draft in self.drafts.iter_mut().rev().take(2) {
+            if let Goal::At { destination: Destination::Exchanged { heading, .. }, .. } = &mut draft.subtask.goal {
+                (*heading, taken) = (true, true);
+            }
+        }
+        if taken { Ok(()) } else { Err(self.unsupported(span, "only things that change places take over a heading")) }
+    }
+
+    fn unsupported(&self, span: Span, reason: &str) -> ParseError {
+        ParseError::Unsupported { text: span.of(self.text).into(), span, reason: reason.into() }
+    }
+
+    fn quantity_several(&self, index: ReferenceIndex) -> bool {
+        self.references.get(index).is_some_and(several)
+    }
+
+    /// "Take the cube and put it on the mat and let go": picking up and letting go are part of the move, not goals
+    /// beside it.
+    fn drop_parts_of_moves(&mut self) {
+        let mut kept: Vec<Draft> = Vec::with_capacity(self.drafts.len());
+        for mut draft in std::mem::take(&mut self.drafts) {
+            if let Some(last) = kept.last()
+                && begins(&last.subtask.goal, &draft.subtask.goal)
+                && last.guard == draft.guard
+            {
+                draft.subtask.span = draft.subtask.span.join(last.subtask.span);
+                draft.subtask.text = draft.subtask.span.of(self.text).into();
+                kept.pop();
+            }
+            if let (Some(Goal::At { object, .. }), Goal::Holding { object: put_down, held: false }) =
+                (kept.last().map(|last| &last.subtask.goal), &draft.subtask.goal)
+                && object == put_down
+            {
+                continue;
+            }
+            kept.push(draft);
+        }
+        self.drafts = kept;
+    }
+}
+
+/// Whether a goal is only the beginning of the next: taking what is then moved.
+fn begins(goal: &Goal, next: &Goal) -> bool {
+    match (goal, next) {
+        (Goal::Holding { object: taken, held: true }, Goal::At { object, .. }) => taken == object,
+        (Goal::Holding { object: taken, held: true }, Goal::Holding { object, held: true }) => taken == object,
+        (Goal::Each { members: taken, body: first, .. }, Goal::Each { members, body: then, .. }) => {
+            taken == members && matches!((first.as_slice(), then.first()), ([only], Some(next)) if begins(only, next))
+        }
+        _ => false,
+    }
+}
+
+/// Whether a goal is another one, whose number of times a clause may have left unsaid.
+fn same_but_times(known: &Goal, goal: &Goal, clause: &Clause) -> bool {
+    match (known, goal) {
+        (Goal::Performed { function: a, object: x, .. }, Goal::Performed { function: b, object: y, times }) => {
+            a == b && x == y && clause.times.is_none() && matches!(times, Times::Count(_))
+        }
+        (known, goal) => known == goal,
+    }
+}
+
+/// What hangs on one "if" is judged when the first of it is due.
+fn judged_together(drafts: Vec<Draft>) -> Vec<Subtask> {
+    let guards: Vec<Option<usize>> = drafts.iter().map(|draft| draft.guard).collect();
+    let mut subtasks = Vec::with_capacity(drafts.len());
+    for (index, draft) in drafts.into_iter().enumerate() {
+        let mut subtask = draft.subtask;
+        let head = draft.guard.and_then(|guard| guards.iter().position(|known| *known == Some(guard)));
+        if let (Some(condition), Some(head)) = (&mut subtask.when, head.filter(|head| *head != index)) {
+            condition.judged_at = Some(head as u32);
+        }
+        subtasks.push(subtask);
+    }
+    subtasks
+}
+
+fn several(reference: &ObjectReference) -> bool {
+    use crate::task::Quantity::{Count, Group};
+    matches!(reference.quantity, Group | Count(_))
+}
+
+/// Tells each reference the first subtask that uses it.
+pub(crate) fn settle_subtasks(subtasks: &[Subtask], references: &mut [ObjectReference]) {
+    for reference in references.iter_mut() {
+        reference.subtask = u32::MAX;
+    }
+    for (subtask, index) in subtasks.iter().zip(0..) {
+        let mut used = subtask.goal.references();
+        used.extend(subtask.when.iter().flat_map(|condition| &condition.arguments));
+        while let Some(next) = used.pop() {
+            let Some(reference) = references.get_mut(next).filter(|r| r.subtask == u32::MAX) else { continue };
+            reference.subtask = index;
+            used.extend(reference.references());
+        }
+    }
+    for reference in references.iter_mut().filter(|r| r.subtask == u32::MAX) {
+        reference.subtask = 0;
+    }
+}
+
+/// The library's nouns that references use, each once.
+pub(crate) fn nouns_of(references: &[ObjectReference]) -> Vec<String> {
+    let mut nouns: Vec<String> = Vec::new();
+    for noun in references.iter().filter_map(|reference| reference.noun.as_ref()) {
+        if !nouns.contains(noun) {
+            nouns.push(noun.clone());
+        }
+    }
+    nouns
+}

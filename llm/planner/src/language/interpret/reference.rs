@@ -1,0 +1,232 @@
+//! References: what a phrase means among the things named before, or as a new one.
+
+use super::{Interpretation, several};
+use crate::{
+    language::{
+        CONTAINS, ParseError, SUPPORTIVE,
+        role::Role,
+        syntax::{NounPhrase, Pronoun},
+    },
+    lexicon::FrameGoal,
+    task::{Destination, Goal, Handled, ObjectReference, Quantity, ReferenceIndex, Span, functions_with_effect},
+};
+use acm_concept::template::TemplateLibrary;
+
+impl Interpretation<'_> {
+    /// The reference that a phrase means: one named before, or a new one.
+    pub(super) fn reference(&mut self, phrase: &NounPhrase, role: &Role) -> Result<ReferenceIndex, ParseError> {
+        match phrase.pronoun {
+            Some(Pronoun::One) => return self.antecedent(phrase.span, role),
+            Some(Pronoun::Several) => {
+                let found = self.antecedents(phrase.span, role)?;
+                return match found.as_slice() {
+                    [one] => Ok(*one),
+                    _ => Err(self.unsupported(phrase.span, "it means several things where one must be named")),
+                };
+            }
+            None => {}
+        }
+        let mut phrase = phrase.clone();
+        if phrase.elided && phrase.noun.is_none() {
+            phrase.noun = self.noun_before(role);
+        }
+        self.check_role(&phrase, role)?;
+        if let Some(known) = self.named_before(&phrase, role)? {
+            if let Some(reference) = self.references.get_mut(known) {
+                require(reference, role, self.library);
+            }
+            return Ok(known);
+        }
+        let others = self.others(&phrase)?;
+        self.fresh(&phrase, role, others)
+    }
+
+    /// A new reference.
+    pub(super) fn fresh(
+        &mut self,
+        phrase: &NounPhrase,
+        role: &Role,
+        other_than: Vec<ReferenceIndex>,
+    ) -> Result<ReferenceIndex, ParseError> {
+        let located = self.described_place(phrase)?;
+        let part_of = match &phrase.part_of {
+            Some(whole) => Some(self.reference(whole, &Role::Mentioned)?),
+            None => self.whole_before(phrase),
+        };
+        let twin_of = match &phrase.twin_of {
+            Some(model) => Some(self.reference(model, &Role::Mentioned)?),
+            None => None,
+        };
+        let holds = |affordance| Role::Affordance(affordance).fits(self.library, phrase.noun.as_deref());
+        if !phrase.contains.is_empty() && !holds(CONTAINS) && !holds(SUPPORTIVE) {
+            return Err(self.unsupported(phrase.span, "nothing can be in it or on it"));
+        }
+        let mut contains = Vec::new();
+        for content in &phrase.contains {
+            contains.push(self.reference(content, &Role::Mentioned)?);
+        }
+        let mut reference = ObjectReference {
+            phrase: phrase.span.of(self.text).into(),
+            span: phrase.span,
+            subtask: 0,
+            quantity: phrase.quantity,
+            noun: phrase.noun.clone(),
+            function: None,
+            affordance: None,
+            color: phrase.color.clone(),
+            size: phrase.size,
+            rank: phrase.rank,
+            free: phrase.free,
+            located,
+            other_than,
+            part_of,
+            twin_of,
+            contains,
+            states: phrase.states.clone(),
+            handled: self.handled(phrase)?,
+        };
+        require(&mut reference, role, self.library);
+        self.references.push(reference);
+        Ok(self.references.len() - 1)
+    }
+
+    fn described_place(&mut self, phrase: &NounPhrase) -> Result<Option<Box<Destination>>, ParseError> {
+        Ok(match &phrase.located {
+            Some(place) => Some(Box::new(self.destination(place, None)?)),
+            None => None,
+        })
+    }
+
+    /// What "you took first" rests on.
+    fn handled(&self, phrase: &NounPhrase) -> Result<Option<Handled>, ParseError> {
+        let Some((frame, rank)) = phrase.handled else { return Ok(None) };
+        let effect = match self.lexicon.frames.get(frame).map(|frame| &frame.goal) {
+            Some(FrameGoal::Holding(true)) => "holding",
+            Some(FrameGoal::At) => "at",
+            Some(FrameGoal::Performed(function)) if function == "press" => "pressed",
+            Some(FrameGoal::State(predicate, true)) => predicate,
+            _ => return Err(self.unsupported(phrase.span, "I keep no record of that")),
+        };
+        Ok(Some(Handled { effect: effect.to_owned(), rank }))
+    }
+
+    /// The whole whose part of this name was spoken of last: "the top drawer of the cabinet ... the bottom drawer".
+    fn whole_before(&self, phrase: &NounPhrase) -> Option<ReferenceIndex> {
+        let same = |known: &&ObjectReference| phrase.noun.is_some() && known.noun == phrase.noun;
+        self.references.iter().rev().find(same).and_then(|known| known.part_of)
+    }
+
+    /// The noun of the thing named last that can play the role.
+    fn noun_before(&self, role: &Role) -> Option<String> {
+        let fits = |known: &&ObjectReference| known.noun.is_some() && role.fits(self.library, known.noun.as_deref());
+        self.references.iter().rev().find(fits).and_then(|known| known.noun.clone())
+    }
+
+    /// "the cube" means the cube named last, unless it says more than that one's description did.
+    fn named_before(&mut self, phrase: &NounPhrase, role: &Role) -> Result<Option<ReferenceIndex>, ParseError> {
+        let new = matches!(phrase.quantity, Quantity::AnyOne | Quantity::Count(_));
+        if new || phrase.other || phrase.twin_of.is_some() || phrase.handled.is_some() || !phrase.contains.is_empty() {
+            return Ok(None);
+        }
+        let located = self.described_place(phrase)?;
+        let part_of = match &phrase.part_of {
+            Some(whole) => Some(self.reference(whole, &Role::Mentioned)?),
+            None => None,
+        };
+        let group = |quantity: Quantity| matches!(quantity, Quantity::Group | Quantity::Count(_));
+        let fits = |known: &ObjectReference| {
+            let noun = match &phrase.noun {
+                Some(noun) => known.noun.as_ref() == Some(noun),
+                None => role.fits(self.library, known.noun.as_deref()),
+            };
+            noun && group(phrase.quantity) == group(known.quantity)
+                && (phrase.color.is_none() || phrase.color == known.color)
+                && (phrase.size.is_none() || phrase.size == known.size)
+                && (phrase.rank.is_none() || phrase.rank == known.rank)
+                && (!phrase.free || known.free)
+                && phrase.states.iter().all(|state| known.states.contains(state))
+                && (located.is_none() || located == known.located)
+                && (part_of.is_none() || part_of == known.part_of)
+        };
+        Ok(self.references.iter().rposition(fits))
+    }
+
+    /// What "other" excludes: everything of the kind named before.
+    fn others(&self, phrase: &NounPhrase) -> Result<Vec<ReferenceIndex>, ParseError> {
+        if !phrase.other {
+            return Ok(Vec::new());
+        }
+        let same_kind = |known: &ObjectReference| match (&phrase.noun, &known.noun) {
+            (Some(a), Some(b)) => {
+                a == b || self.library.with_noun(a).any(|t| self.library.with_noun(b).any(|other| other.name == t.name))
+            }
+            _ => true,
+        };
+        let single = |reference: &&ObjectReference| !several(reference) && same_kind(reference);
+        let named = self.references.iter().enumerate().filter(|(_, reference)| single(reference));
+        let others: Vec<ReferenceIndex> = named.map(|(index, _)| index).collect();
+        if others.is_empty() { Err(self.no_antecedent(phrase.span)) } else { Ok(others) }
+    }
+
+    /// What a pronoun stands for: the thing acted on last that can play the role.
+    pub(super) fn antecedent(&self, span: Span, role: &Role) -> Result<ReferenceIndex, ParseError> {
+        let single = |index: ReferenceIndex| self.references.get(index).filter(|reference| !several(reference));
+        let fits =
+            |index: &ReferenceIndex| single(*index).is_some_and(|known| role.fits(self.library, known.noun.as_deref()));
+        let acted_on = self.drafts.iter().rev().filter_map(|draft| draft.subtask.goal.object());
+        let mentioned = (0..self.references.len()).rev();
+        acted_on.chain(mentioned).find(fits).ok_or_else(|| self.no_antecedent(span))
+    }
+
+    /// What "them" stands for: the group named last, or what was acted on in a row; of things that were stacked the
+    /// lowest, which takes the others with it.
+    pub(super) fn antecedents(&self, span: Span, role: &Role) -> Result<Vec<ReferenceIndex>, ParseError> {
+        if let Some(Goal::At { object, destination: Destination::On { reference } | Destination::In { reference } }) =
+            self.drafts.last().map(|draft| &draft.subtask.goal)
+            && !self.quantity_several(*object)
+            && self.references.get(*reference).is_some_and(|carrier| role.fits(self.library, carrier.noun.as_deref()))
+        {
+            return Ok(vec![*reference]);
+        }
+        let clause = self.drafts.last().map(|draft| draft.subtask.span);
+        let same = self.drafts.iter().rev().take_while(|draft| Some(draft.subtask.span) == clause);
+        let mut together: Vec<ReferenceIndex> = same.filter_map(|draft| draft.subtask.goal.object()).collect();
+        together.reverse();
+        together.dedup();
+        if together.len() > 1 {
+            return Ok(together);
+        }
+        let fits = |known: &ObjectReference| several(known) && role.fits(self.library, known.noun.as_deref());
+        self.references.iter().rposition(fits).map(|index| vec![index]).ok_or_else(|| self.no_antecedent(span))
+    }
+
+    pub(super) fn no_antecedent(&self, span: Span) -> ParseError {
+        ParseError::NoAntecedent { text: span.of(self.text).into(), span }
+    }
+
+    fn check_role(&self, phrase: &NounPhrase, role: &Role) -> Result<(), ParseError> {
+        match role.misfit(self.library, phrase.noun.as_deref()) {
+            None => Ok(()),
+            Some(reason) => Err(self.unsupported(phrase.span, &reason)),
+        }
+    }
+}
+
+/// Writes down what the role asks of the thing, where that is more than was asked so far.
+pub(super) fn require(reference: &mut ObjectReference, role: &Role, library: &TemplateLibrary) {
+    match role {
+        Role::Effect(predicate) => {
+            // Only where one function does it: otherwise any of them will do and the query must not choose.
+            if let [name] = functions_with_effect(library, predicate)[..] {
+                reference.function.get_or_insert_with(|| name.to_owned());
+            }
+        }
+        Role::Function(name) => {
+            reference.function.get_or_insert_with(|| name.clone());
+        }
+        Role::Affordance(affordance) => {
+            reference.affordance.get_or_insert_with(|| (*affordance).to_owned());
+        }
+        Role::Mentioned => {}
+    }
+}
