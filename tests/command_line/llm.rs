@@ -243,14 +243,7 @@ fn every_instruction_of_a_scenario_fits_the_form_in_which_a_model_answers() {
             let task = planner.parse(text, &library).unwrap();
             let prompt = planner.prompt(text, &library).unwrap();
             let answer = serde_json::to_value(planner.answer(&task)).unwrap();
-            let reply = acm_llm::ChatReply {
-                text: answer.to_string(),
-                reasoning: None,
-                usage: acm_llm::Usage::default(),
-                end: acm_llm::EndReason::Complete,
-                backend: "test".into(),
-                model: "test".into(),
-            };
+            let reply = acm_llm::ChatReply::new(answer.to_string(), "test", "test");
             let request = acm_llm::ChatRequest {
                 stage: "parse".into(),
                 prompt: acm_llm::PromptId { id: prompt.id, version: prompt.version },
