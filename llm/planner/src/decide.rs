@@ -1,6 +1,7 @@
 //! The order of questions before each step: do I see, do I know what I will need, is it done, what next.
 
 use crate::{
+    counsel::Avoided,
     decision::{Decision, GiveUpCause, PlanOptions, Situation, Step, Unknown},
     explanation::{Explanation, Grounds, step_words},
     ground::{Grounder, Stuck, missing},
@@ -36,6 +37,7 @@ pub(crate) fn decide(
     view: &dyn MemoryView,
     situation: &Situation,
     options: &PlanOptions,
+    avoided: &[Avoided],
 ) -> Decision {
     let current = view.progress().current();
     let Some(subtask) = task.subtasks.get(current as usize) else {
@@ -43,7 +45,7 @@ pub(crate) fn decide(
     };
     let may_look = situation.looks < MAX_LOOKS;
     let ground = Grounder::new(lexicon, task, view, options, may_look);
-    let mind = Mind { ground, weighed: RefCell::default(), view, situation, options, current };
+    let mind = Mind { ground, weighed: RefCell::default(), view, situation, options, avoided, current };
     mind.decide(task, subtask).unwrap_or_else(|stuck| mind.look_or_give_up(stuck))
 }
 
@@ -54,6 +56,8 @@ struct Mind<'a> {
     view: &'a dyn MemoryView,
     situation: &'a Situation,
     options: &'a PlanOptions,
+    /// Skills on objects that this decision leaves out.
+    avoided: &'a [Avoided],
     current: u32,
 }
 
@@ -274,6 +278,8 @@ impl Mind<'_> {
                 limits.spent.entry(tried).or_insert(text);
             }
         }
+        let left_out = self.avoided.iter().map(|a| ((a.skill.clone(), a.object), a.reason.clone()));
+        limits.spent.extend(left_out);
         (limits, last_failure)
     }
 
