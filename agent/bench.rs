@@ -2,17 +2,19 @@
 //!
 //! | module | holds |
 //! |---|---|
+//! | [`ablation`] | the same episodes with one language model after another |
 //! | [`targets`] | floors and goals, and the comparison with them |
 //! | [`perception`] | real labelled frames, and the fixed rendered suite with its truth |
 //! | [`runtime`] | frames and messages from one to the other, the trace, restarts |
 //! | [`world`] | physics and pictures beside MuJoCo, grasps and primitives, pace, audit, snapshots |
 
+pub mod ablation;
 pub mod perception;
 pub mod runtime;
 pub mod targets;
 pub mod world;
 
-use crate::cli::{BenchArgs, BenchCommand, Exit, PerceptionArgs, WorldArgs};
+use crate::cli::{AblationArgs, BenchArgs, BenchCommand, Exit, PerceptionArgs, WorldArgs};
 use anyhow::Context;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
@@ -140,7 +142,8 @@ impl BenchResult {
 
 /// Runs `acm bench`. It ends with 1 if a figure misses its floor or a part could not be measured.
 pub fn run(command: &BenchCommand) -> anyhow::Result<Exit> {
-    let (BenchCommand::Perception(PerceptionArgs { common: args, .. })
+    let (BenchCommand::Ablation(AblationArgs { common: args, .. })
+    | BenchCommand::Perception(PerceptionArgs { common: args, .. })
     | BenchCommand::Runtime(args)
     | BenchCommand::World(WorldArgs { common: args, .. })) = command;
     // First, so that a mistake in the file does not cost the measurement.
@@ -149,6 +152,7 @@ pub fn run(command: &BenchCommand) -> anyhow::Result<Exit> {
         None => Targets::own()?,
     };
     let result = match command {
+        BenchCommand::Ablation(args) => ablation::measure(args),
         BenchCommand::Perception(args) => perception::measure(args, &targets),
         BenchCommand::Runtime(args) => runtime::measure(args),
         BenchCommand::World(args) => world::measure(args),
