@@ -2,6 +2,7 @@
 //!
 //! | module | holds |
 //! |---|---|
+//! | [`ablation`] | the same episodes with one language model after another |
 //! | [`targets`] | floors and goals, and the comparison with them |
 //! | [`bddl`] | reads household activities and tabletop tasks of the outside data |
 //! | [`perception`] | real labelled frames, and the fixed rendered suite with its truth |
@@ -10,6 +11,7 @@
 //! | [`runtime`] | frames and messages from one to the other, the trace, restarts |
 //! | [`world`] | physics and pictures beside MuJoCo, grasps and primitives, pace, audit, snapshots |
 
+pub mod ablation;
 pub mod bddl;
 pub mod identity;
 pub mod perception;
@@ -18,7 +20,7 @@ pub mod runtime;
 pub mod targets;
 pub mod world;
 
-use crate::cli::{BenchArgs, BenchCommand, Exit, PerceptionArgs, PlannerArgs, WorldArgs};
+use crate::cli::{AblationArgs, BenchArgs, BenchCommand, Exit, PerceptionArgs, PlannerArgs, WorldArgs};
 use anyhow::Context;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
@@ -146,7 +148,8 @@ impl BenchResult {
 
 /// Runs `acm bench`. It ends with 1 if a figure misses its floor or a part could not be measured.
 pub fn run(command: &BenchCommand) -> anyhow::Result<Exit> {
-    let (BenchCommand::Perception(PerceptionArgs { common: args, .. })
+    let (BenchCommand::Ablation(AblationArgs { common: args, .. })
+    | BenchCommand::Perception(PerceptionArgs { common: args, .. })
     | BenchCommand::Identity(args)
     | BenchCommand::Planner(PlannerArgs { common: args, .. })
     | BenchCommand::Runtime(args)
@@ -157,6 +160,7 @@ pub fn run(command: &BenchCommand) -> anyhow::Result<Exit> {
         None => Targets::own()?,
     };
     let result = match command {
+        BenchCommand::Ablation(args) => ablation::measure(args),
         BenchCommand::Perception(args) => perception::measure(args, &targets),
         BenchCommand::Identity(args) => identity::measure(args),
         BenchCommand::Planner(args) => planner::measure(args),

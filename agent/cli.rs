@@ -7,16 +7,17 @@ pub mod trace;
 use crate::{
     bench,
     bench::{perception::PerceptionPart, planner::PlannerPart, world::WorldPart},
-    demo, doctor,
+    config, demo, doctor,
     inject::Injection,
     library,
-    llm::LlmId,
+    llm::{self, LlmId},
     perceive, run, scenario, serve,
 };
 use acm_actors::{
     AgentError,
     episode::Until,
     remote::{Address, FrameMode},
+    settings::Stage,
     trace::FrameDetail,
 };
 use acm_sim::Setting;
@@ -96,8 +97,63 @@ pub enum Command {
     /// The other process of a bench: takes frames and says when.
     #[command(hide = true)]
     BenchReader(BenchReaderArgs),
+    /// List the language models of a configuration, or try them.
+    #[command(subcommand)]
+    Llm(LlmCommand),
+    /// Show or check a configuration file.
+    #[command(subcommand)]
+    Config(ConfigCommand),
     /// Say what this machine has of what ACM needs.
     Doctor,
+}
+
+/// The verbs of `acm llm`.
+#[derive(Debug, Subcommand)]
+pub enum LlmCommand {
+    /// The language models of a configuration: where they are, which key they need, at which stages they are asked.
+    List(LlmListArgs),
+    /// Ask one language model, or all, a tiny question: is the schema heeded, are images taken, what does it cost.
+    Check(LlmCheckArgs),
+}
+
+/// Arguments of `acm llm list`.
+#[derive(Debug, Args)]
+pub struct LlmListArgs {
+    /// The configuration; ./acm.toml if not given and there.
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// Print JSON instead of text.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `acm llm check`.
+#[derive(Debug, Args)]
+pub struct LlmCheckArgs {
+    /// A backend of the configuration; all of them if not given.
+    pub id: Option<String>,
+    /// The configuration; ./acm.toml if not given and there.
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// Print JSON instead of text.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// The verbs of `acm config`.
+#[derive(Debug, Subcommand)]
+pub enum ConfigCommand {
+    /// Print all that holds, defaults included, as such a file.
+    Show {
+        /// The configuration; ./acm.toml if not given and there.
+        #[arg(long, value_name = "FILE")]
+        config: Option<PathBuf>,
+    },
+    /// Say whether a file is sound, and which variables it names that are not set. Nobody is asked.
+    Check {
+        /// The file; ./acm.toml if not given.
+        file: Option<PathBuf>,
+    },
 }
 
 /// One seed or a range that includes both ends.
@@ -171,12 +227,18 @@ pub struct RunArgs {
     /// What to do when memory cannot decide: abstain if neither this nor the configuration says.
     #[arg(long, value_enum)]
     pub on_unknown: Option<OnUnknownArg>,
-    /// What the agent goes by: a TOML file, such as `[perception]` with `min_confidence = 0.3`.
+    /// What the agent goes by and which language models there are: a TOML file such as acm.example.toml; ./acm.toml if
+    /// not given and there.
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
-    /// The language model that reads instructions: rules (none), scripted=FILE, replay=FILE (docs/llm.md).
-    #[arg(long, value_name = "ID", default_value_t)]
-    pub llm: LlmId,
+    /// The language model that is asked: rules (none), scripted=FILE, replay=FILE, or a backend of the configuration
+    /// (docs/llm.md). If not given, the variable ACM_LLM names it, else the configuration.
+    #[arg(long, value_name = "ID")]
+    pub llm: Option<LlmId>,
+    /// What it is asked for: parse (to read the instruction), select (to choose among several ways), reflect (to go on
+    /// after a failure). If not given, what the configuration says, else parse.
+    #[arg(long, value_name = "STAGE,...", value_delimiter = ',')]
+    pub llm_stages: Option<Vec<Stage>>,
     /// Give this instruction instead of the scenario's own.
     #[arg(long)]
     pub instruction: Option<String>,
@@ -220,8 +282,8 @@ pub struct RunArgs {
 
 impl RunArgs {
     /// The words that start this run again, but for its seed, its memory and what it leaves: runs that may be compared
-    /// seed by seed have the same.
-    pub fn words(&self) -> Vec<String> {
+    /// seed by seed have the same. `llm` is the model that is asked, and `stages` for what, whoever has said so.
+    pub fn words(&self, llm: &LlmId, stages: &[Stage]) -> Vec<String> {
         let mut words: Vec<String> = self.scenario.iter().cloned().collect();
         let mut option = |name: &str, value: Option<String>| {
             words.extend(value.into_iter().flat_map(|value| [format!("--{name}"), value]));
@@ -232,7 +294,9 @@ impl RunArgs {
         option("method", Some(self.method.clone()));
         let on_unknown = self.on_unknown.and_then(|on_unknown| on_unknown.to_possible_value());
         option("on-unknown", on_unknown.map(|value| value.get_name().to_owned()));
-        option("llm", (self.llm != LlmId::Rules).then(|| self.llm.to_string()));
+        option("llm", (*llm != LlmId::Rules).then(|| llm.to_string()));
+        let names = || stages.iter().map(|stage| stage.name()).collect::<Vec<_>>().join(",");
+        option("llm-stages", (*llm != LlmId::Rules && *stages != [Stage::Parse]).then(names));
         option("instruction", self.instruction.clone());
         option("library", self.library.as_ref().map(path));
         self.inject.iter().for_each(|fault| option("inject", Some(fault.to_string())));
@@ -393,6 +457,8 @@ pub fn exit_of_error(error: &anyhow::Error) -> Exit {
 /// The benches.
 #[derive(Debug, Subcommand)]
 pub enum BenchCommand {
+    /// The same episodes with one language model after another, and with one that errs at a given rate.
+    Ablation(AblationArgs),
     /// Real labelled frames and foreign meshes (found through the variable ACM_DATA), and rendered tables with their truth.
     Perception(PerceptionArgs),
     /// Who is who when a scene is seen again: identical things in a row, and household rooms (found through the variable
@@ -421,6 +487,38 @@ pub struct BenchArgs {
     /// Compare with the targets of this file instead of the built-in ones.
     #[arg(long, value_name = "FILE")]
     pub against: Option<PathBuf>,
+}
+
+/// Arguments of `acm bench ablation`.
+#[derive(Debug, Args)]
+pub struct AblationArgs {
+    /// What every bench takes; the episodes are those of each scenario with each backend.
+    #[command(flatten)]
+    pub common: BenchArgs,
+    /// Language models, as `acm run --llm` names them.
+    #[arg(long, value_name = "ID,...", value_delimiter = ',', default_value = "rules")]
+    pub backends: Vec<LlmId>,
+    /// What they are asked for; parse if not given.
+    #[arg(long, value_name = "STAGE,...", value_delimiter = ',')]
+    pub llm_stages: Option<Vec<Stage>>,
+    /// The configuration; ./acm.toml if not given and there.
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// Scenarios; all of this program if not given.
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
+    pub scenarios: Vec<String>,
+    /// The first seed.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed_from: u64,
+    /// The memory.
+    #[arg(long, default_value = "acm")]
+    pub method: String,
+    /// Shares of wrong answers of a model that errs; 0, 0.1, 0.3 and 0.6 if not given.
+    #[arg(long, value_name = "SHARE,...", value_delimiter = ',')]
+    pub rates: Option<Vec<f64>>,
+    /// Leave out the model that errs.
+    #[arg(long)]
+    pub no_degradation: bool,
 }
 
 /// Arguments of `acm bench perception`.
@@ -485,6 +583,9 @@ pub fn run(cli: Cli) -> anyhow::Result<Exit> {
         #[cfg(feature = "learned")]
         Command::Learn(command) => crate::learn::run(&command),
         Command::BenchReader(args) => bench::runtime::peer::run(&args),
+        Command::Llm(LlmCommand::List(args)) => llm::list::run(&args),
+        Command::Llm(LlmCommand::Check(args)) => llm::check::run(&args),
+        Command::Config(command) => config::run(&command),
         Command::Doctor => doctor::run(),
     }
 }

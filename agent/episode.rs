@@ -63,6 +63,10 @@ pub struct EpisodeConfig {
     pub panic_at: Option<(String, u64)>,
     /// The language model that reads instructions; the rules do without one.
     pub llm: Option<Llm>,
+    /// What it is asked for.
+    pub stages: Vec<acm_actors::settings::Stage>,
+    /// For benches: a wrong answer of the model is neither asked for again nor replaced.
+    pub llm_alone: bool,
     /// The event at which the run ends.
     pub until: Option<Until>,
     /// The words that start such a run from the command line; empty where it was not started there. For the trace.
@@ -324,6 +328,8 @@ impl Runner {
             .transplant_at(config.faults.transplant.as_ref().map(|(_, at)| at.clone()), donated.into())
             .until(config.until)
             .llm(config.llm.as_ref().map(Llm::backend))
+            .stages(config.stages.iter().copied())
+            .aided(!config.llm_alone)
             .journal(journal)
             .trace(trace.clone())
             .panic_at(panic_at.and_then(|(name, message)| role(name).map(|role| PanicAt { role, message: *message })))

@@ -114,8 +114,9 @@ impl Told {
                 self.places.clear();
                 vec!["fault     another memory has taken the place of the run's own; the task is still known".into()]
             }
-            Message::Decided { decision, .. } => {
+            Message::Decided { decision, counsel, .. } => {
                 let mut lines = self.at_rest(f64::INFINITY);
+                lines.extend(counsel.iter().map(|counsel| format!("asked     {counsel}")));
                 lines.extend(self.decision_lines(decision));
                 lines
             }

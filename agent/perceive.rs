@@ -49,7 +49,7 @@ pub fn run(args: &PerceiveArgs) -> anyhow::Result<Exit> {
     };
     let unknown = GrounderConfig::of_unknown_camera();
     let settings = match args.config.as_deref() {
-        Some(path) => config::read_over(&unknown, path)?,
+        Some(path) => config::read_over(&unknown, path)?.settings,
         None => Settings { perception: unknown, ..Settings::default() },
     };
     let file = args.config.as_deref().map_or_else(String::new, |path| path.display().to_string());

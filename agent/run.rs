@@ -2,18 +2,18 @@
 
 use crate::{
     cli::{Exit, RunArgs},
-    config,
+    config::{self, Config},
     episode::{EpisodeConfig, EpisodeResult, Runner},
     inject::Faults,
     live::Live,
-    llm::Llm,
+    llm::{self, Llm, LlmId},
     narrate::Narrator,
     remote,
     statistics::{median_and, wilson95},
     trace::recording::TraceRequest,
     video::{Camera, VideoFile},
 };
-use acm_actors::{message::Message, report::Ending};
+use acm_actors::{message::Message, report::Ending, settings::Stage};
 use acm_concept::{task::OnUnknown, template::TemplateLibrary};
 use acm_runtime::journal::{Both, Journal, NoJournal};
 use acm_sim::Scenario;
@@ -23,7 +23,6 @@ use serde::Serialize;
 use std::{
     collections::{BTreeMap, BTreeSet},
     io::Write,
-    path::Path,
     sync::Arc,
 };
 
@@ -43,12 +42,24 @@ pub fn run(args: &RunArgs) -> anyhow::Result<Exit> {
 
 /// Reads what a run needs beside its world.
 pub(crate) fn prepare(args: &RunArgs) -> anyhow::Result<(EpisodeConfig, TemplateLibrary)> {
-    let mut settings = args.config.as_deref().map(config::read).transpose()?.unwrap_or_default();
-    if let Some((field, _)) = settings.tools.named().next() {
-        let file = args.config.as_deref().unwrap_or(Path::new("--config")).display();
+    let (file, config) = config::open(args.config.as_deref())?;
+    if let Some((field, _)) = config.settings.tools.named().next() {
+        let file = file.unwrap_or_default();
+        let file = file.display();
         bail!("{file}: tools.{field}: a run asks no tools, as it could not be replayed; they help `acm perceive`");
     }
+    prepare_with(args, config)
+}
+
+/// As [`prepare`], whatever files say.
+pub(crate) fn prepare_with(args: &RunArgs, config: Config) -> anyhow::Result<(EpisodeConfig, TemplateLibrary)> {
+    let Config { mut settings, llm } = config;
     settings.on_unknown = args.on_unknown.map_or(settings.on_unknown, Into::into);
+    let id = llm::chosen(args.llm.as_ref(), &llm);
+    let llm = Llm::open(&id, &llm, args.llm_stages.as_deref())?;
+    let asked = llm.as_ref().and_then(Llm::first).map_or(id, LlmId::Backend);
+    let said = || args.llm_stages.clone().unwrap_or_else(|| vec![Stage::Parse]);
+    let stages = llm.as_ref().and_then(Llm::stages).unwrap_or_else(said);
     let config = EpisodeConfig {
         method: args.method.clone(),
         settings,
@@ -58,8 +69,9 @@ pub(crate) fn prepare(args: &RunArgs) -> anyhow::Result<(EpisodeConfig, Template
         no_motion: args.no_motion,
         sensor: args.sensor.clone(),
         until: args.until,
-        llm: Llm::open(&args.llm)?,
-        arguments: args.words(),
+        llm,
+        arguments: args.words(&asked, &stages),
+        stages,
         ..EpisodeConfig::default()
     };
     let library = match &args.library {

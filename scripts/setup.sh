@@ -78,3 +78,5 @@ require_tools
 require_renderer
 fetch_sources
 install_trace_reader
+# Servers of language models that are not ours, for the adapters' tests; the same holds for them.
+scripts/llm_servers.sh install

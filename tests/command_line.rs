@@ -13,6 +13,8 @@ mod export;
 mod live;
 #[path = "command_line/llm.rs"]
 mod llm;
+#[path = "command_line/llm_servers.rs"]
+mod llm_servers;
 #[path = "command_line/long.rs"]
 mod long;
 #[path = "command_line/other_programs.rs"]

@@ -10,7 +10,7 @@ use crate::{
     perception::PerceptionActor,
     planner::PlannerActor,
     report::EpisodeReport,
-    settings::{Settings, Signal, Turning},
+    settings::{Settings, Signal, Stage, Turning},
     trace::Trace,
     verifier::VerifierActor,
 };
@@ -31,7 +31,7 @@ use acm_runtime::{
     system::{PanicAt, SystemBuilder, SystemError},
 };
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     sync::{Arc, Mutex, PoisonError, Weak},
     time::Duration,
 };
@@ -81,6 +81,8 @@ pub struct AgentBuilder {
     until: Option<Until>,
     panic_at: Option<PanicAt>,
     llm: Option<Arc<dyn Backend>>,
+    stages: BTreeSet<Stage>,
+    aided: bool,
 }
 
 impl AgentBuilder {
@@ -139,6 +141,16 @@ impl AgentBuilder {
         self.llm = llm;
         self
     }
+    /// What the model is asked for; to read instructions alone if this is not said.
+    pub fn stages(mut self, stages: impl IntoIterator<Item = Stage>) -> Self {
+        self.stages = stages.into_iter().collect();
+        self
+    }
+    /// Leaves the model to itself if `false`, to measure what the aid is worth: see [`PlannerActor::aided`].
+    pub fn aided(mut self, aided: bool) -> Self {
+        self.aided = aided;
+        self
+    }
     /// The agent.
     pub fn build(mut self) -> Result<Agent, AgentError> {
         let later = self.then.iter().map(|(_, settings)| settings);
@@ -194,6 +206,8 @@ impl Agent {
             until: None,
             panic_at: None,
             llm: None,
+            stages: BTreeSet::from([Stage::Parse]),
+            aided: true,
         }
     }
 
@@ -274,7 +288,8 @@ impl Agent {
             None => Arc::clone(&parts.journal),
         };
         let observer = parts.trace.clone().map(|trace| trace as Arc<dyn MemoryObserver>);
-        let (llm, hybrid) = (parts.llm.clone(), parts.llm.is_some());
+        let (llm, aided) = (parts.llm.clone(), parts.aided);
+        let stages = llm.as_ref().map(|_| parts.stages.clone()).unwrap_or_default();
         let system = SystemBuilder::new(1, journal)
             .actor(EPISODE, Box::new(move || Box::new(Episode::new(task.clone(), upheavals.clone()).until(until))))
             .actor(
@@ -296,7 +311,11 @@ impl Agent {
                 PLANNER,
                 Box::new(move || {
                     let (planner, library) = (Arc::clone(&planner), Arc::clone(&library));
-                    Box::new(PlannerActor::new(planner, library, plans.clone(), options.clone()).hybrid(hybrid))
+                    Box::new(
+                        PlannerActor::new(planner, library, plans.clone(), options.clone())
+                            .asking(stages.clone())
+                            .aided(aided),
+                    )
                 }),
             )
             .actor(EXECUTOR, Box::new(move || Box::new(ExecutorActor::new(hands.clone()))))

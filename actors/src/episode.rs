@@ -75,6 +75,7 @@ impl Episode {
                 ended: Time::ZERO,
                 restarts: 0,
                 readings: Vec::new(),
+                counsels: Vec::new(),
             },
         }
     }
@@ -98,7 +99,10 @@ impl Episode {
                 self.report.readings.extend(reading.map(|reading| *reading));
                 self.parsed(task, out);
             }
-            Message::Decided { decision, invocation } => self.decided(*decision, invocation, out)?,
+            Message::Decided { decision, invocation, counsel } => {
+                self.report.counsels.extend(counsel.map(|counsel| *counsel));
+                self.decided(*decision, invocation, out)?;
+            }
             Message::SkillEnded(report) => self.skill_ended(report, out),
             Message::Kept { transition, view } => self.kept(transition, view, out),
             Message::Verdict { transition, verdict } => self.judged(transition, verdict, out),

@@ -1,6 +1,6 @@
 //! Every message between the actors.
 
-use crate::report::{EpisodeReport, Reading};
+use crate::report::{Counsel, EpisodeReport, Reading};
 use acm_concept::{
     camera::FrameHeader,
     embodiment::{Command, Feedback},
@@ -188,6 +188,9 @@ pub enum Message {
         decision: Box<Decision>,
         /// The skill bound to perceived geometry, if the decision is to act.
         invocation: Option<Box<SkillInvocation>>,
+        /// What a language model had to do with it, where one was asked.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        counsel: Option<Box<Counsel>>,
     },
 
     /// episode -> executor: run a skill.

@@ -107,6 +107,31 @@ impl fmt::Display for Reading {
     }
 }
 
+/// What a language model had to do with a decision.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Counsel {
+    /// What it was asked for: `select` or `reflect`.
+    pub stage: &'static str,
+    /// How it was asked; under `fallback` why the planner has decided by itself.
+    #[serde(flatten)]
+    pub asked: Reading,
+    /// Why it chose so, in its own words.
+    pub reason: Option<String>,
+}
+
+impl fmt::Display for Counsel {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Counsel { stage, asked, reason } = self;
+        match (&asked.fallback, &asked.answered_by) {
+            (Some(why), _) => write!(f, "{stage}: DECIDED BY THE PLANNER INSTEAD OF THE MODEL: {why}"),
+            (None, Some((backend, model))) => {
+                write!(f, "{stage}: chosen by the model {model} ({backend}): {}", reason.as_deref().unwrap_or_default())
+            }
+            (None, None) => write!(f, "{stage}: chosen by nobody"),
+        }
+    }
+}
+
 /// An episode from the agent's side.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EpisodeReport {
@@ -129,6 +154,9 @@ pub struct EpisodeReport {
     /// How a language model read each instruction; empty where none was used.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub readings: Vec<Reading>,
+    /// How a language model took part in decisions; empty where none did.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub counsels: Vec<Counsel>,
 }
 
 impl EpisodeReport {

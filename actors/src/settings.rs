@@ -4,9 +4,13 @@ use crate::tools::ToolSettings;
 use acm_concept::task::OnUnknown;
 use acm_perception::GrounderConfig;
 use serde::{Deserialize, Serialize};
-use std::sync::{
-    Arc,
-    atomic::{AtomicBool, Ordering},
+use std::{
+    fmt,
+    str::FromStr,
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
 };
 
 /// What an agent goes by, but for its memory and its words.
@@ -22,6 +26,46 @@ pub struct Settings {
     /// [`AgentError::Tools`]: crate::AgentError::Tools
     #[serde(skip_serializing_if = "ToolSettings::is_default")]
     pub tools: ToolSettings,
+}
+
+/// What a language model may be asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Stage {
+    /// To turn the instruction into goals.
+    Parse,
+    /// To choose among several ways that lead to a goal.
+    Select,
+    /// To say what went wrong with a skill that failed, and how to go on.
+    Reflect,
+}
+
+impl Stage {
+    /// All of them.
+    pub const ALL: [Stage; 3] = [Stage::Parse, Stage::Select, Stage::Reflect];
+
+    /// As it is written.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Stage::Parse => "parse",
+            Stage::Select => "select",
+            Stage::Reflect => "reflect",
+        }
+    }
+}
+
+impl fmt::Display for Stage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for Stage {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Stage, String> {
+        let names = Stage::ALL.map(Stage::name).join(", ");
+        let found = Stage::ALL.into_iter().find(|stage| stage.name() == text);
+        found.ok_or_else(|| format!("`{text}` is nothing that a model may be asked for: there are {names}"))
+    }
 }
 
 /// Something that is to happen once another thing has happened.

@@ -11,18 +11,17 @@
 //!
 //! [`published`] makes problems of published tasks; [`simulator`] follows plans.
 
-pub mod drawn;
-pub mod goals;
-pub mod peer;
-pub mod published;
-pub mod simulator;
-pub mod verdicts;
 pub mod alfred;
+pub mod drawn;
 pub mod goals;
 pub mod instructions;
 pub mod inventory;
 pub mod libero;
+pub mod peer;
+pub mod published;
 pub mod scene;
+pub mod simulator;
+pub mod verdicts;
 
 use super::BenchResult;
 use crate::cli::PlannerArgs;

@@ -88,6 +88,7 @@ impl From<Call> for CallRow {
             Some(Answer::Reply(said)) => {
                 (reasoning, reply) = (said.reasoning.clone(), Some(laid_out(&said.text)));
                 note = format!("{} ({}), {}", said.model, said.backend, said.usage);
+                said.notes.iter().for_each(|more| note += &format!("; {more}"));
             }
             Some(Answer::Error(error)) => note = error.to_string(),
             None => {}
@@ -143,6 +144,9 @@ pub fn tell(entry: &Entry, out: &mut impl Write) -> anyhow::Result<bool> {
             Answer::Error(_) => {}
             Answer::Reply(reply) => {
                 writeln!(out, "{} ({}), {}, ended: {:?}", reply.model, reply.backend, reply.usage, reply.end)?;
+                for note in &reply.notes {
+                    writeln!(out, "note: {note}")?;
+                }
                 if let Some(reasoning) = &reply.reasoning {
                     paragraph("reasoning", reasoning, out)?;
                 }

@@ -12,10 +12,11 @@ use super::{
 };
 use crate::{
     cli::{Exit, RunArgs, trace::TraceReplayArgs},
+    config::Config,
     episode::{EpisodeConfig, Runner},
     inject::Faults,
-    llm::Llm,
-    run::prepare,
+    llm::{Llm, LlmId},
+    run::prepare_with,
 };
 use acm_actors::{message::Message, settings::Signal, trace::words};
 use acm_runtime::{
@@ -119,8 +120,9 @@ pub fn replay(recorded: &Recorded, args: &TraceReplayArgs) -> anyhow::Result<Out
     let donor = recorded.donor()?;
     let mut run = recorded.arguments(donor.as_ref().map(tempfile::TempDir::path))?;
     // What a model replied is in the trace: its files need not be there.
-    let llm = recorded.llm(std::mem::take(&mut run.llm))?.map(Llm::Cassette);
-    let (config, library) = prepare(&run)?;
+    let id = run.llm.replace(LlmId::Rules).unwrap_or_default();
+    let llm = recorded.llm(id)?.map(Llm::Cassette);
+    let (config, library) = prepare_with(&run, Config::default())?;
     let config = EpisodeConfig { llm, ..config };
     let comparison = Arc::new(Comparison::new(recorded, args));
     let journal = Arc::clone(&comparison) as Arc<dyn Journal<Message>>;

@@ -1,9 +1,9 @@
 //! A request and its reply, in a form that is no provider's own.
 
+pub use crate::error::CallError;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::{fmt, sync::Arc};
-use thiserror::Error;
 
 /// One question to a model. All of it is written down wherever a request is: it has no place for keys, and addresses
 /// are no part of it.
@@ -166,6 +166,28 @@ pub struct ChatReply {
     pub backend: String,
     /// The model that answered.
     pub model: String,
+    /// What it cost in US dollars, where the prices are known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cost_usd: Option<f64>,
+    /// What must be known of how it came about: parameters that were sent, refused or left out, and how often was asked.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<String>,
+}
+
+impl ChatReply {
+    /// A complete answer of a backend that costs nothing.
+    pub fn new(text: impl Into<String>, backend: impl Into<String>, model: impl Into<String>) -> ChatReply {
+        ChatReply {
+            text: text.into(),
+            reasoning: None,
+            usage: Usage::default(),
+            end: EndReason::Complete,
+            backend: backend.into(),
+            model: model.into(),
+            cost_usd: None,
+            notes: Vec::new(),
+        }
+    }
 }
 
 /// Tokens of a call.
@@ -216,52 +238,6 @@ pub enum EndReason {
     MaxTokens,
     /// It declined to answer.
     Refused,
-}
-
-/// Why a call gave no reply. Whatever is said here is written down: it names no key.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, Error)]
-#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
-pub enum CallError {
-    /// Nobody answers there.
-    #[error("the model cannot be reached: {reason}")]
-    Unreachable {
-        /// Why not.
-        reason: String,
-    },
-    /// It has too much to do.
-    #[error("the model is overloaded")]
-    Overloaded,
-    /// It was asked too often.
-    #[error("the model was asked too often{}", .retry_after_ms.map_or_else(String::new, |ms| format!("; it can be asked again after {ms} ms")))]
-    RateLimited {
-        /// When it may be asked again, milliseconds.
-        #[serde(default)]
-        retry_after_ms: Option<u64>,
-    },
-    /// It took too long.
-    #[error("the model gave no answer within {limit_ms} ms")]
-    Timeout {
-        /// How long it had, milliseconds.
-        limit_ms: u64,
-    },
-    /// No rule of a script fits.
-    #[error("no rule of {script} fits the request (stage `{stage}`, last words \"{last}\")")]
-    NoRule {
-        /// The script.
-        script: String,
-        /// The request's stage.
-        stage: String,
-        /// The end of the last turn.
-        last: String,
-    },
-    /// A recorded model was asked something else.
-    #[error("{cassette} holds no such request: {difference}")]
-    ReplayMiss {
-        /// The recording.
-        cassette: String,
-        /// In what the nearest recorded request differs.
-        difference: String,
-    },
 }
 
 /// What a call came to, as it is written down.
@@ -320,8 +296,7 @@ pub(crate) mod tests {
 
     pub(crate) fn reply(text: &str) -> ChatReply {
         let usage = Usage { input: 7, output: 3, ..Usage::default() };
-        let end = EndReason::Complete;
-        ChatReply { text: text.into(), reasoning: None, usage, end, backend: "test".into(), model: "none".into() }
+        ChatReply { usage, ..ChatReply::new(text, "test", "none") }
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Chat with language models: neutral requests and replies, answers that are checked here, and backends.
 //!
-//! It knows no robotics and no wire format. A request has no place for keys: whoever needs one takes it elsewhere, so
+//! It knows no robotics. A request has no place for keys: whoever needs one takes it elsewhere, so
 //! that what is written down of a request never holds one.
 //!
 //! | module | holds |
@@ -10,6 +10,10 @@
 //! | [`backend`] | the trait behind which every model stands |
 //! | [`script`] | a backend that answers by the rules of a file |
 //! | [`cassette`] | a backend that answers as was recorded |
+//! | [`server`] | a backend behind an HTTP server: retries, limits, keys |
+//! | [`route`] | several backends as one: a chain for each stage, within a budget |
+//! | [`config`] | backends as a configuration file names them |
+//! | [`wire`] | the formats of such servers, as pure functions |
 //!
 //! ```
 //! # use acm_llm::{Backend, ChatRequest, Dialogue, Next, Script};
@@ -33,15 +37,23 @@
 pub mod backend;
 pub mod cassette;
 pub mod chat;
+pub mod config;
 pub mod dialogue;
+mod error;
 mod file;
+pub mod route;
 pub mod script;
+pub mod server;
+pub mod wire;
 
 pub use backend::{Backend, Reply};
 pub use cassette::Cassette;
 pub use chat::{
     Answer, CallError, ChatReply, ChatRequest, EndReason, Image, Parameters, Part, PromptId, Speaker, Turn, Usage,
 };
+pub use config::LlmConfig;
 pub use dialogue::{Dialogue, Fault, Next, SchemaError};
 pub use file::FileError;
+pub use route::Route;
 pub use script::Script;
+pub use server::{Server, ServerConfig};

@@ -132,12 +132,10 @@ impl RawRule {
         };
         let answer = match (text, self.error) {
             (Some(text), _) => Ok(ChatReply {
-                text,
                 reasoning: self.reasoning,
                 usage: self.usage,
                 end: self.end,
-                backend: "scripted".into(),
-                model: model.into(),
+                ..ChatReply::new(text, "scripted", model)
             }),
             (None, Some(error)) => Err(error),
             (None, None) => return Err("it has no answer".into()),

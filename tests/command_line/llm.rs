@@ -18,13 +18,13 @@ const SECRETS: [&str; 6] =
 const MARKER: &str = "key-that-must-not-be-seen";
 
 /// The answer that a model would give which reads an instruction as the rules do.
-fn answer(instruction: &str) -> String {
+pub fn answer(instruction: &str) -> String {
     let library = acm_memory::default_library().unwrap();
     let planner = Planner::new().unwrap();
     serde_json::to_string(&planner.answer(&planner.parse(instruction, &library).unwrap())).unwrap()
 }
 
-fn instruction() -> String {
+pub fn instruction() -> String {
     let text = crate::scenario_text();
     let line = text.lines().find_map(|line| line.strip_prefix("instruction = ")).unwrap();
     line.trim_matches('"').to_owned()
@@ -72,7 +72,7 @@ fn what_is_no_model_or_no_script_is_refused_in_one_line() {
     refuses(&["run", "put-back-block", "--llm", "replay=no-such.jsonl"], &["no-such.jsonl"]);
     let output = acm().args(["run", "put-back-block", "--llm", "gpt"]).output().unwrap();
     let told = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.code() == Some(2) && told.contains("rules, scripted=FILE or replay=FILE"), "{told}");
+    assert!(output.status.code() == Some(2) && told.contains("rules, scripted=FILE, replay=FILE"), "{told}");
 }
 
 #[test]
@@ -189,6 +189,38 @@ fn a_model_that_fails_is_replaced_by_the_rules_and_that_is_said() {
 }
 
 #[test]
+fn after_a_failure_the_model_says_how_to_go_on_and_cannot_choose_what_is_not_there() {
+    let dir = tempfile::tempdir().unwrap();
+    let trace = dir.path().join("run.mcap");
+    let reflects = |way: &str| {
+        let answer = format!("{{ diagnosis = 'It was refused.', reason = 'Nothing moves.', way = '{way}' }}");
+        let rules = format!("{}[[rule]]\nstage = \"reflect\"\njson = {answer}\n", right(""));
+        script(dir.path(), &format!("{way}.toml"), &rules)
+    };
+    let more = ["--no-motion", "--llm-stages", "parse,select,reflect", "--trace-frames", "full"];
+    let (told, code) = run(&reflects("give-up"), &trace, &more);
+    let chosen = "asked     reflect: chosen by the model parrot-1 (scripted): It was refused. Nothing moves.";
+    assert!(told.contains(chosen) && told.contains("after a failure: It was refused."), "{told}");
+    assert_eq!(code, Some(3), "the agent gives up");
+    assert!(prints(&["trace", "replay", text(&trace)]).starts_with("identical: "));
+    let asked = &messages(&trace, "ask-llm")[1]["body"]["request"];
+    assert_eq!((&asked["stage"], &asked["prompt"]["id"]), (&"reflect".into(), &"reflect".into()));
+    // Trying again is the planner's own way here; what is not offered is refused, and the planner decides.
+    let (told, _) = run(&reflects("W1"), &trace, &more);
+    assert!(told.contains("reflect: chosen by the model parrot-1"), "{told}");
+    let (told, _) = run(&reflects("W9"), &trace, &more);
+    assert!(
+        told.contains("reflect: DECIDED BY THE PLANNER INSTEAD OF THE MODEL: the answer is not of the schema"),
+        "{told}"
+    );
+    let counsel = messages(&trace, "decided").iter().find_map(|m| m["body"].get("counsel").cloned()).unwrap();
+    assert_eq!((&counsel["stage"], &counsel["calls"]), (&"reflect".into(), &3.into()));
+    // What is not asked for is not asked.
+    let (told, _) = run(&reflects("give-up"), &trace, &["--no-motion"]);
+    assert!(!told.contains("reflect:"), "{told}");
+}
+
+#[test]
 fn a_port_or_a_planner_that_crashes_is_replaced_and_the_question_asked_anew() {
     let dir = tempfile::tempdir().unwrap();
     let trace = dir.path().join("run.mcap");
@@ -278,14 +310,7 @@ fn every_instruction_of_a_scenario_fits_the_form_in_which_a_model_answers() {
             let task = planner.parse(text, &library).unwrap();
             let prompt = planner.prompt(text, &library).unwrap();
             let answer = serde_json::to_value(planner.answer(&task)).unwrap();
-            let reply = acm_llm::ChatReply {
-                text: answer.to_string(),
-                reasoning: None,
-                usage: acm_llm::Usage::default(),
-                end: acm_llm::EndReason::Complete,
-                backend: "test".into(),
-                model: "test".into(),
-            };
+            let reply = acm_llm::ChatReply::new(answer.to_string(), "test", "test");
             let request = acm_llm::ChatRequest {
                 stage: "parse".into(),
                 prompt: acm_llm::PromptId { id: prompt.id, version: prompt.version },

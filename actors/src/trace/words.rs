@@ -125,7 +125,10 @@ fn text(message: &Message) -> String {
         Message::Decide { situation, .. } => {
             format!("what next? {} looks in a row, {} skills left", situation.looks, situation.skills_left)
         }
-        Message::Decided { decision, .. } => decision_words(decision),
+        Message::Decided { decision, counsel, .. } => {
+            let counsel = counsel.as_ref().map_or_else(String::new, |counsel| format!("; {counsel}"));
+            format!("{}{counsel}", decision_words(decision))
+        }
         Message::Execute(skill) => {
             let attempt = if skill.attempt > 0 { format!(", attempt {}", skill.attempt + 1) } else { String::new() };
             format!("run {} on {} by {}{attempt}", skill.skill, skill.part, skill.kind)

@@ -57,7 +57,12 @@ impl Scene {
         let template = self.library.get(thing.template)?;
         let values: Vec<(&str, f64)> = part.values();
         let nouns: Vec<(String, f64)> = template.nouns(&values).iter().map(|noun| ((*noun).to_owned(), 0.9)).collect();
-        let place = Place { support: thing.on, pose: Pose::from_translation(thing.at), tolerance_m: 0.03 };
+        let place = Place {
+            support: thing.on,
+            pose: Pose::from_translation(thing.at),
+            tolerance_m: 0.03,
+            heading_tolerance_rad: None,
+        };
         self.objects.push(ObjectEntry {
             id,
             category: nouns.first()?.0.clone(),

@@ -3,14 +3,18 @@
 use super::{Comparison, Outcome, Recorded, tell};
 use crate::{
     cli::{Exit, trace::TraceReplayArgs},
-    config,
+    config::{self, Config},
     episode::{EpisodeConfig, Fork, Runner},
     inject::{Faults, Injection},
     llm::Llm,
-    run::{exit_of, prepare, print_judgement},
+    run::{exit_of, prepare_with, print_judgement},
     trace::recording::TraceRequest,
 };
-use acm_actors::{message::Message, settings::Signal, trace::FrameDetail};
+use acm_actors::{
+    message::Message,
+    settings::{Settings, Signal},
+    trace::FrameDetail,
+};
 use acm_runtime::journal::Journal;
 use acm_sim::Scenario;
 use anyhow::{Context, bail};
@@ -34,10 +38,11 @@ pub(super) fn run(recorded: &Recorded, args: &TraceReplayArgs, after: u64) -> an
     let name = run.scenario.as_deref().context("the run was on a robot in another process: it has no simulator")?;
     let scenario = Scenario::open_with(name, &run.set)?;
     // Up to the fork the model replies as it did; what the last recorded message asks is asked of the other one.
-    let (id, other) = (std::mem::take(&mut run.llm), Signal::default());
+    let (id, other) = (run.llm.take().unwrap_or_default(), Signal::default());
     let before = recorded.llm(id.clone())?;
-    run.llm = otherwise.llm.clone().unwrap_or(id);
-    let (config, library) = prepare(&run)?;
+    run.llm = Some(otherwise.llm.clone().unwrap_or(id));
+    let file = config::open(otherwise.config.as_deref())?.1;
+    let (config, library) = prepare_with(&run, Config { settings: Settings::default(), llm: file.llm })?;
     let afterwards = config.llm.clone().map(Box::new);
     let llm = match before {
         Some(before) => Some(Llm::Fork { before, after: afterwards, from: other.clone() }),
@@ -45,7 +50,7 @@ pub(super) fn run(recorded: &Recorded, args: &TraceReplayArgs, after: u64) -> an
     };
     let memory = recorded.memory()?;
     let settings = recorded.settings()?.unwrap_or(config.settings);
-    let mut then = otherwise.config.as_deref().map(config::read).transpose()?.unwrap_or_else(|| settings.clone());
+    let mut then = otherwise.config.as_ref().map_or_else(|| settings.clone(), |_| file.settings);
     then.on_unknown = otherwise.on_unknown.map_or(then.on_unknown, Into::into);
     let begins = Signal::default();
     let config = EpisodeConfig {

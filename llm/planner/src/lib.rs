@@ -14,11 +14,13 @@
 //! | `search` | means-ends search over the skills that memory offers |
 //! | `decide` | the order of questions before each step; groups one by one, trials, searches; limits |
 //! | [`classical`] | planning over operators that are data: goals with quantifiers, heuristic search, plans that are checked |
+//! | [`counsel`] | decisions about which a language model may be asked: which way to take, how to go on after a failure |
 //! | [`bind`] | a step with perceived geometry, ready for a controller |
 //! | [`decision`], [`explanation`] | the answers and their reasons |
 
 pub mod bind;
 pub mod classical;
+pub mod counsel;
 mod decide;
 pub mod decision;
 pub mod explanation;
@@ -31,6 +33,7 @@ mod search;
 pub mod task;
 
 pub use bind::BindError;
+pub use counsel::{Choice, Question};
 pub use decision::{Decision, GiveUpCause, PlanOptions, Situation, Step, Unknown};
 pub use explanation::{Explanation, Grounds, Rejected, ResolvedReference};
 pub use hybrid::TaskPrompt;

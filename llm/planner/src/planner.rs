@@ -2,6 +2,7 @@
 
 use crate::{
     bind::{self, BindError},
+    counsel::Avoided,
     decide,
     decision::{Decision, PlanOptions, Situation, Step, Unknown},
     ground::Grounder,
@@ -111,7 +112,18 @@ impl Planner {
     }
     /// The next step of a task as memory stands.
     pub fn decide(&self, task: &Task, view: &dyn MemoryView, situation: &Situation, options: &PlanOptions) -> Decision {
-        decide::decide(&self.lexicon, task, view, situation, options)
+        self.decide_without(task, view, situation, options, &[])
+    }
+    /// The same, with some skills on some objects left out.
+    pub(crate) fn decide_without(
+        &self,
+        task: &Task,
+        view: &dyn MemoryView,
+        situation: &Situation,
+        options: &PlanOptions,
+        avoided: &[Avoided],
+    ) -> Decision {
+        decide::decide(&self.lexicon, task, view, situation, options, avoided)
     }
     /// Binds a step to the perceived geometry of its part.
     pub fn bind(

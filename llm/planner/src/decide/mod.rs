@@ -9,6 +9,7 @@ mod trial;
 mod tries;
 
 use crate::{
+    counsel::Avoided,
     decision::{Decision, GiveUpCause, PlanOptions, Situation, Step, Unknown},
     explanation::{Explanation, Grounds, step_words},
     ground::{Grounder, Stuck},
@@ -38,6 +39,7 @@ pub(crate) fn decide(
     view: &dyn MemoryView,
     situation: &Situation,
     options: &PlanOptions,
+    avoided: &[Avoided],
 ) -> Decision {
     let current = view.progress().current();
     let Some(subtask) = task.subtasks.get(current as usize) else {
@@ -53,6 +55,7 @@ pub(crate) fn decide(
         view,
         situation,
         options,
+        avoided,
         current,
     };
     mind.decide(subtask).unwrap_or_else(|stuck| mind.look_or_give_up(subtask, stuck))
@@ -68,6 +71,8 @@ struct Mind<'a> {
     view: &'a dyn MemoryView,
     situation: &'a Situation,
     options: &'a PlanOptions,
+    /// Skills on objects that this decision leaves out.
+    avoided: &'a [Avoided],
     current: u32,
 }
 

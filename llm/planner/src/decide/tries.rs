@@ -86,6 +86,8 @@ impl Mind<'_> {
                 limits.spent.entry(tried).or_insert(text);
             }
         }
+        let left_out = self.avoided.iter().map(|a| ((a.skill.clone(), a.object), a.reason.clone()));
+        limits.spent.extend(left_out);
         (limits, last_failure)
     }
 }
