@@ -48,18 +48,21 @@ impl World {
         for fact in source.section("init") {
             let Some((predicate, arguments)) = fact.headed() else { return Err(format!("no fact: {fact}")) };
             let words: Vec<String> = arguments.iter().filter_map(Expression::word).map(str::to_string).collect();
-            match (predicate.to_ascii_lowercase().as_str(), words.as_slice()) {
-                ("ontop" | "on", [thing, support]) => drop(world.at.insert(thing.clone(), (How::On, support.clone()))),
-                ("inside" | "in", [thing, container]) => {
-                    world.at.insert(thing.clone(), (How::In, container.clone()));
+            let pair = |thing: &String, other: &String| (thing.clone(), other.clone());
+            let _new = match (predicate.to_ascii_lowercase().as_str(), words.as_slice()) {
+                ("ontop" | "on", [thing, support]) => {
+                    world.at.insert(thing.clone(), (How::On, support.clone())).is_none()
                 }
-                ("inroom", [thing, room]) => drop(world.rooms.insert((thing.clone(), room.clone()))),
-                ("under", [thing, other]) => drop(world.under.insert((thing.clone(), other.clone()))),
-                ("nextto", [thing, other]) => drop(world.near.insert((thing.clone(), other.clone()))),
-                ("open", [thing]) => drop(world.open.insert(thing.clone())),
-                ("turnon" | "toggled_on", [thing]) => drop(world.running.insert(thing.clone())),
-                _ => {}
-            }
+                ("inside" | "in", [thing, container]) => {
+                    world.at.insert(thing.clone(), (How::In, container.clone())).is_none()
+                }
+                ("inroom", [thing, room]) => world.rooms.insert(pair(thing, room)),
+                ("under", [thing, other]) => world.under.insert(pair(thing, other)),
+                ("nextto", [thing, other]) => world.near.insert(pair(thing, other)),
+                ("open", [thing]) => world.open.insert(thing.clone()),
+                ("turnon" | "toggled_on", [thing]) => world.running.insert(thing.clone()),
+                _ => false,
+            };
         }
         Ok(world)
     }
