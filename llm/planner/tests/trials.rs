@@ -167,7 +167,7 @@ fn things_are_covered_in_a_row_and_uncovered_by_colour_though_nothing_shows_it()
         let cubes = noun("cube", Quantity::Group);
         let references =
             vec![cubes.clone(), cubes, colored("red", RED), colored("green", GREEN), colored("blue", BLUE)];
-        let covered = |object, holds| Goal::State { predicate: "covered".into(), object, holds };
+        let covered = |object, holds| Goal::State { predicate: "covered".into(), object, holds, by: None };
         let hide = Goal::Each { members: 0, order: Ordering::From(Direction::Left), body: vec![covered(0, true)] };
         let reveal = Goal::Each { members: 1, order: Ordering::Named(vec![2, 3, 4]), body: vec![covered(1, false)] };
         let mut uncovered: Vec<ObjectId> = Vec::new();

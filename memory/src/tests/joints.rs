@@ -72,7 +72,7 @@ fn what_an_action_opened_stays_open_until_another_one_closes_it() {
     let mut memory = seen();
     let open = Literal::parse("open(O1)").unwrap();
     assert_eq!(truth(&memory, "open(O1)"), Truth::Unknown);
-    let mut act = |memory: &mut AcmMemory, felt: Option<Literal>, ended_s: f64| {
+    let act = |memory: &mut AcmMemory, felt: Option<Literal>, ended_s: f64| {
         let mut executed = report(&*memory.view(), "pick", ObjectId(1), ended_s).unwrap();
         executed.predicted = vec![open.clone()];
         executed.report.felt = felt.into_iter().map(|literal| (literal, 0.9)).collect();
@@ -81,7 +81,7 @@ fn what_an_action_opened_stays_open_until_another_one_closes_it() {
     act(&mut memory, Some(open.clone()), 4.0);
     look(&mut memory, 9, 5.0, &[chest(0.1)], &[], &open_hand(5.0)).unwrap();
     assert_eq!(truth(&memory, "open(O1)"), Truth::Yes);
-    act(&mut memory, Some(open.negate()), 6.0);
+    act(&mut memory, Some(open.clone().negate()), 6.0);
     assert_eq!(truth(&memory, "open(O1)"), Truth::No);
     // A try that nobody could judge leaves the state open.
     act(&mut memory, None, 8.0);

@@ -4,8 +4,8 @@ use super::{Grounded, MAX_LOOKS, Mind};
 use crate::{
     decision::GiveUpCause,
     ground::{Stuck, missing},
-    search::{Want, believed, same_atom},
-    task::{Condition, Goal, Ordering, ReferenceIndex, Subtask, Times},
+    search::{Want, believed, place_over, same_atom},
+    task::{Condition, Goal, Ordering, Quantity, ReferenceIndex, Subtask, Times},
 };
 use acm_concept::ids::ObjectId;
 use acm_concept::literal::{Belief, Evidence, Literal, Term, Truth};
@@ -124,6 +124,9 @@ impl Mind<'_> {
                 Literal::new("at", vec![Term::Object(object), Term::Place(place.value)])
             }
             Goal::Holding { held, .. } => holds(Literal::new("holding", about()), *held),
+            Goal::State { predicate, holds: true, by: Some(by), .. } if !self.any_will_do(*by) => {
+                self.brought_about_with(predicate, object, *by)?
+            }
             Goal::State { predicate, holds: wanted, .. } => holds(Literal::new(predicate, about()), *wanted),
             Goal::Performed { function, times, .. } => {
                 often = self.number(times, function, object, since)?;
@@ -139,6 +142,22 @@ impl Mind<'_> {
         let belief = believed(self.view, &literal);
         let wants = vec![Want::Holds(literal.clone())];
         Ok(Grounded { wants, literals: vec![(literal, belief)], times: often, guessed })
+    }
+
+    /// Whether it does not matter which thing of a kind is meant: then the search takes the one that costs least.
+    fn any_will_do(&self, index: ReferenceIndex) -> bool {
+        self.task.references.get(index).is_some_and(|reference| reference.quantity == Quantity::AnyOne)
+    }
+
+    /// A state that is brought about with a certain thing ("cover the cube with the lid"): covers are known, no tools yet.
+    fn brought_about_with(&self, predicate: &str, object: ObjectId, by: ReferenceIndex) -> Result<Literal, Stuck> {
+        let tool = self.ground.object(by)?.value;
+        let place = (predicate == "covered").then(|| place_over(self.view, tool, object)).flatten();
+        let place = place.ok_or_else(|| {
+            let text = format!("I know no way to make {object} {predicate} with {} ({tool})", self.ground.phrase(by));
+            Stuck::give_up(GiveUpCause::Plan, text)
+        })?;
+        Ok(Literal::new("at", vec![Term::Object(tool), Term::Place(place)]))
     }
 
     /// What had to be taken in the hand for a state of other things is put down again before the subtask counts as done.

@@ -162,6 +162,14 @@ fn covers_for(state: &State<'_>, object: ObjectId) -> Vec<(ObjectId, Place)> {
     covers.into_iter().take(MAX_COVERS).map(|(_, id, place)| (id, place)).collect()
 }
 
+/// Where a cover would stand over a thing; `None` for what covers nothing, or a thing that stands nowhere.
+pub(crate) fn place_over(view: &dyn MemoryView, cover: ObjectId, object: ObjectId) -> Option<Place> {
+    let entry = view.object(cover).filter(|entry| is_cover(entry))?;
+    let (pose, support) = State::now(view).place(object)?;
+    let pose = Pose::from_yaw(pose.translation, entry.pose().map_or(0.0, |pose| pose.yaw()));
+    Some(Place { support, pose, tolerance_m: PLACE_TOLERANCE_M, heading_tolerance_rad: None })
+}
+
 /// Whether a transition that took effect brought a literal about: by its declared effects, or by where it put things.
 pub(crate) fn brings_about(view: &dyn MemoryView, transition: &Transition, literal: &Literal) -> bool {
     let declared = |effect: &Literal| effect.negated == literal.negated && same_atom(effect, literal);
