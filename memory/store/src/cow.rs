@@ -56,6 +56,10 @@ impl<T: Clone> Shared<T> {
             self.length += 1;
         }
     }
+    /// All, to be written.
+    pub fn all_mut(&mut self) -> impl Iterator<Item = &mut T> {
+        self.groups.iter_mut().flat_map(|group| Arc::make_mut(group).iter_mut().map(Arc::make_mut))
+    }
     /// All, in order.
     pub fn iter(&self) -> impl Iterator<Item = &T> {
         self.groups.iter().flat_map(|group| group.iter().map(|value| &**value))
@@ -162,22 +166,22 @@ const CHUNK: usize = 4096;
 /// A list of small values that only grows at its end.
 #[derive(Debug, Clone)]
 pub struct Grown<T> {
-    mapped: Run<T>,
+    mapped: Arc<Run<T>>,
     chunks: Vec<Arc<Vec<T>>>,
     length: usize,
 }
 
 impl<T> Default for Grown<T> {
     fn default() -> Self {
-        Grown { mapped: Run::default(), chunks: Vec::new(), length: 0 }
+        Grown { mapped: Arc::default(), chunks: Vec::new(), length: 0 }
     }
 }
 
 impl<T: Pod> Grown<T> {
-    /// A list that begins with what a file holds.
+    /// A list that begins with what is there, in a file or in memory.
     pub fn of(mapped: Run<T>) -> Grown<T> {
         let length = mapped.get().len();
-        Grown { mapped, chunks: Vec::new(), length }
+        Grown { mapped: Arc::new(mapped), chunks: Vec::new(), length }
     }
     /// How many there are.
     #[inline]

@@ -4,7 +4,7 @@ use crate::map::Map;
 use std::{
     collections::BTreeMap,
     fs::{self, File, OpenOptions, TryLockError},
-    io::{self, Read, Seek, SeekFrom, Write},
+    io::{self, Write},
     path::{Path, PathBuf},
 };
 
@@ -77,10 +77,8 @@ impl Disk for Folder {
             return Map::of_file(&file);
         }
         // What is written on is copied, never mapped.
-        let mut bytes = Vec::with_capacity(usize::try_from(file.seek(SeekFrom::End(0))?).unwrap_or(0));
-        file.rewind()?;
-        file.read_to_end(&mut bytes)?;
-        Ok(Map::of_bytes(&bytes))
+        let length = usize::try_from(file.metadata()?.len()).map_err(|_too_large| io::ErrorKind::FileTooLarge)?;
+        Map::of_reader(&mut file, length)
     }
     fn create(&mut self, name: &str) -> io::Result<()> {
         let file =

@@ -113,6 +113,8 @@ struct Search<'s> {
     rest: Vec<&'s Filter>,
     /// Those that the plan settles for rows of the base, tried on fresh rows.
     settled: Vec<&'s Filter>,
+    /// Blocks of the base that may hold a hit, where the whole base is looked at.
+    candidates: Vec<u64>,
     found: Vec<(f32, Id)>,
     most: usize,
     /// Below this nothing is taken any more.
@@ -134,10 +136,13 @@ impl<'s> Search<'s> {
         });
         let most = query.wanted();
         let best = query.success.iter().map(|(_, chance)| *chance).fold(1e-6f32, f32::max).ln();
+        let sets: Vec<u16> = sets.collect();
+        let whole = matches!(plan, Plan::Nearest | Plan::Heaviest);
         Search {
             state,
             query,
-            sets: sets.collect(),
+            candidates: if whole { state.table.candidates(&sets) } else { Vec::new() },
+            sets,
             rest: filters.iter().filter(|filter| !by_plan(filter) && !is_set(filter)).collect(),
             settled: filters.iter().filter(by_plan).collect(),
             found: Vec::with_capacity(most.min(64) + 1),
@@ -246,6 +251,9 @@ impl<'s> Search<'s> {
         bound >= self.least && bound > f32::NEG_INFINITY
     }
     fn whole(&mut self, number: usize, fresh: bool) {
+        if !fresh && self.candidates.get(number / 64).is_some_and(|word| word >> (number % 64) & 1 == 0) {
+            return;
+        }
         if let Some(block) = self.state.table.blocks.get(number)
             && self.is_worth(block)
         {
@@ -268,7 +276,11 @@ impl<'s> Search<'s> {
                 break;
             }
             blocks.clear();
-            for number in group * GROUP..((group + 1) * GROUP).min(state.table.base) {
+            // A group has as many blocks as a word has bits.
+            let mut word = self.candidates.get(group).copied().unwrap_or(0);
+            while word != 0 {
+                let number = group * GROUP + word.trailing_zeros() as usize;
+                word &= word - 1;
                 if let Some(block) = state.table.blocks.get(number) {
                     blocks.push((self.bound(&block.hot.get().bounds), number));
                 }
@@ -285,11 +297,12 @@ impl<'s> Search<'s> {
             self.whole(*number as usize, false);
         }
         for number in state.table.order.iter().map(|number| *number as usize) {
-            let Some(block) = state.table.blocks.get(number) else { continue };
-            let bound = block.hot.get().bounds.weight + self.success;
-            if state.table.risen.contains(&(number as u32)) {
+            let there = self.candidates.get(number / 64).is_some_and(|word| word >> (number % 64) & 1 == 1);
+            if !there || state.table.risen.contains(&(number as u32)) {
                 continue;
             }
+            let Some(block) = state.table.blocks.get(number) else { continue };
+            let bound = block.hot.get().bounds.weight + self.success;
             if bound < self.least {
                 break;
             }

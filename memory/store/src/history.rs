@@ -1,6 +1,6 @@
 //! Chains of changes: what was so at one moment, as it was known at another.
 
-use crate::{Id, Nanos, cow::Grown, event::Sure, symbols::Symbol};
+use crate::{Id, Nanos, cow::{Grown, Run}, event::Sure, symbols::Symbol};
 use bytemuck::{Pod, Zeroable};
 use serde::{Deserialize, Serialize};
 use std::{collections::BTreeMap, sync::Arc};
@@ -24,7 +24,7 @@ pub const FIRST: Key = 16;
 /// The moment is not the commit's less a number of microseconds; it is kept aside.
 const ASIDE: u32 = u32::MAX;
 
-/// One change: 28 bytes.
+/// One change: 20 bytes, and 12 more where its value is wide.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Delta {
@@ -38,9 +38,16 @@ pub struct Delta {
     pub key: Key,
     /// Number of the source among [`crate::Kind::Source`] words, and confidence in steps of 1/255.
     pub origin: [u8; 2],
-    /// The new value, by key.
-    pub value: [u32; 3],
+    /// The new value, by key; of a wide one its place.
+    value: u32,
 }
+
+/// Whether values of a key have three words: positions, rotations, numbers and relations.
+fn is_wide(key: Key, value: [u32; 3]) -> bool {
+    matches!(key, POSITION | ROTATION) || key >= FIRST && (value[1] != 0 || value[2] != 0)
+}
+/// Marks a value whose three words stand elsewhere, where its key alone does not tell.
+const WIDE: u32 = 1 << 31;
 
 /// When the events up to one came to be known.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
@@ -57,6 +64,10 @@ pub struct Known {
 pub struct History {
     /// The changes.
     pub deltas: Grown<Delta>,
+    /// Wide values.
+    pub wide: Grown<[u32; 3]>,
+    /// How many of the changes lie object by object.
+    pub sorted: usize,
     /// Moments that do not fit into the changes themselves.
     pub aside: Arc<BTreeMap<u32, Nanos>>,
     /// The commits.
@@ -154,8 +165,57 @@ impl History {
                 ASIDE
             }
         };
+        let value = if is_wide(key, value) {
+            self.wide.push(value);
+            WIDE | (self.wide.len() - 1) as u32
+        } else {
+            value[0]
+        };
         self.deltas.push(Delta { before, sequence, earlier_us, key, origin, value });
         index + 1
+    }
+    /// The value of a change.
+    #[inline]
+    pub fn value(&self, delta: &Delta) -> [u32; 3] {
+        // Weights are negative numbers, whose first bit is set as well.
+        if delta.value & WIDE == 0 || delta.key == CONFIDENCE {
+            return [delta.value, 0, 0];
+        }
+        self.wide.get((delta.value & !WIDE) as usize).copied().unwrap_or_default()
+    }
+    /// Whether so much came since the changes were sorted that they should be sorted again.
+    pub fn is_loose(&self) -> bool {
+        self.deltas.len() - self.sorted > 65_536.max(self.sorted / 2)
+    }
+    /// Lays the changes of each object side by side, so that reading a chain touches a few cache lines. `last` are the ends
+    /// of all chains; they are set to where they are then.
+    pub fn sort<'a>(&mut self, last: impl Iterator<Item = &'a mut u32>) {
+        let mut sorted = History { commits: std::mem::take(&mut self.commits), ..History::default() };
+        let (mut aside, mut chain) = (BTreeMap::new(), Vec::new());
+        let mut deltas = Vec::with_capacity(self.deltas.len());
+        let mut wide = Vec::with_capacity(self.wide.len());
+        for end in last.filter(|end| **end > 0) {
+            chain.clear();
+            chain.extend(self.chain(*end));
+            let mut before = 0;
+            for (index, delta) in chain.iter().rev() {
+                let mut delta = Delta { before, ..**delta };
+                if delta.value & WIDE != 0 && delta.key != CONFIDENCE {
+                    wide.push(self.value(&delta));
+                    delta.value = WIDE | (wide.len() - 1) as u32;
+                }
+                if let Some(moment) = self.aside.get(index) {
+                    aside.insert(deltas.len() as u32, *moment);
+                }
+                deltas.push(delta);
+                before = deltas.len() as u32;
+            }
+            *end = before;
+        }
+        sorted.sorted = deltas.len();
+        (sorted.deltas, sorted.wide) = (Grown::of(Run::Owned(deltas)), Grown::of(Run::Owned(wide)));
+        sorted.aside = Arc::new(aside);
+        *self = sorted;
     }
     /// The changes of a chain, latest known first, with their indices.
     pub fn chain(&self, last: u32) -> impl Iterator<Item = (u32, &Delta)> {
@@ -168,11 +228,22 @@ impl History {
         })
     }
     /// The value of each asked key at `valid` as it was known at `known`. `ordered`: no change of the chain is of an
-    /// earlier moment than the one before it. A key that did not change by then keeps `None`.
-    pub fn at<const N: usize>(&self, last: u32, ordered: bool, keys: [Key; N], valid: Nanos, known: Nanos) -> [Option<[u32; 3]>; N] {
+    /// earlier moment than the one before it. A key that did not change by then keeps `None`; so do those of which `never`
+    /// says that they did not change at all.
+    pub fn at<const N: usize>(
+        &self,
+        last: u32,
+        ordered: bool,
+        keys: [Key; N],
+        never: impl Fn(Key) -> bool,
+        (valid, known): (Nanos, Nanos),
+    ) -> [Option<[u32; 3]>; N] {
         let (until_valid, until_known) = (self.until(valid), self.until(known));
         let mut found: [Option<(Nanos, [u32; 3])>; N] = [None; N];
-        let mut missing = N;
+        let mut missing = keys.iter().filter(|key| !never(**key)).count();
+        if missing == 0 {
+            return [None; N];
+        }
         for (index, delta) in self.chain(last) {
             if u64::from(delta.sequence) >= until_known || !self.was(index, delta, valid, until_valid) {
                 continue;
@@ -182,7 +253,7 @@ impl History {
             };
             if ordered {
                 if slot.is_none() {
-                    *slot = Some((0, delta.value));
+                    *slot = Some((0, self.value(delta)));
                     missing -= 1;
                     if missing == 0 {
                         break;
@@ -192,7 +263,7 @@ impl History {
                 let moment = self.valid(index, delta);
                 // Later known first: of equal moments the one that was known last counts.
                 if slot.is_none_or(|(best, _)| moment > best) {
-                    *slot = Some((moment, delta.value));
+                    *slot = Some((moment, self.value(delta)));
                 }
             }
         }
@@ -208,7 +279,7 @@ impl History {
                 sequence: u64::from(delta.sequence),
                 key: delta.key,
                 origin: (delta.origin[0], f32::from(delta.origin[1]) / 255.0),
-                value: delta.value,
+                value: self.value(delta),
             })
             .collect();
         all.reverse();
@@ -216,7 +287,7 @@ impl History {
     }
     /// Bytes that it takes.
     pub fn bytes(&self) -> usize {
-        self.deltas.len() * size_of::<Delta>() + self.aside.len() * 24 + self.commits.len() * size_of::<Known>()
+        self.deltas.len() * size_of::<Delta>() + self.wide.len() * 12 + self.aside.len() * 24 + self.commits.len() * size_of::<Known>()
     }
 }
 

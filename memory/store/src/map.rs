@@ -32,6 +32,14 @@ impl Map {
         }
         Map(Bytes::Owned(words, bytes.len()))
     }
+    /// A copy of a file that is written on, or of its first bytes.
+    pub fn of_reader(file: &mut impl std::io::Read, length: usize) -> io::Result<Map> {
+        let mut words = vec![0u128; length.div_ceil(16)];
+        if let Some(place) = bytemuck::cast_slice_mut::<u128, u8>(&mut words).get_mut(..length) {
+            file.read_exact(place)?;
+        }
+        Ok(Map(Bytes::Owned(words, length)))
+    }
     /// All bytes.
     pub fn bytes(&self) -> &[u8] {
         match &self.0 {

@@ -18,7 +18,7 @@ use bytemuck::{Pod, Zeroable};
 use std::{collections::BTreeMap, sync::Arc};
 
 const MAGIC: [u8; 8] = *b"ACM-SNP2";
-const SECTIONS: usize = 18;
+const SECTIONS: usize = 19;
 const ALIGN: usize = 64;
 
 /// Name of a snapshot.
@@ -94,6 +94,7 @@ pub fn write(state: &State, batch: u64, document: &[u8]) -> Vec<u8> {
     out.slice(state.relations.back.sorted());
     out.slice(state.numbers.sorted());
     out.section(|bytes| state.history.deltas.iter().for_each(|delta| bytes.extend_from_slice(bytemuck::bytes_of(delta))));
+    out.section(|bytes| state.history.wide.iter().for_each(|value| bytes.extend_from_slice(bytemuck::cast_slice(value))));
     out.slice(&aside);
     out.section(|bytes| state.history.commits.iter().for_each(|known| bytes.extend_from_slice(bytemuck::bytes_of(known))));
     out.slice(state.space.large().points.get());
@@ -173,7 +174,7 @@ pub fn read(map: Arc<Map>) -> Result<Found, String> {
 }
 
 fn unpack(map: &Arc<Map>, head: &Head) -> Option<Found> {
-    let [words, hot, slots, masks, mask_ends, heads, parts, part_ends, spans, forth, back, numbers, deltas, aside, commits, points, planes, rest] =
+    let [words, hot, slots, masks, mask_ends, heads, parts, part_ends, spans, forth, back, numbers, deltas, wide, aside, commits, points, planes, rest] =
         head.sections;
     let bytes = |section: Section| map.slice::<u8>(section.at as usize, section.length as usize);
     let mut symbols: Symbols = serde_json::from_slice(bytes(words)?).ok()?;
@@ -209,6 +210,8 @@ fn unpack(map: &Arc<Map>, head: &Head) -> Option<Found> {
     state.relations.back = Sorted::of(run::<Back>(map, back)?);
     state.numbers = Sorted::of(run::<Number>(map, numbers)?);
     state.history.deltas = Grown::of(run::<Delta>(map, deltas)?);
+    state.history.wide = Grown::of(run::<[u32; 3]>(map, wide)?);
+    state.history.sorted = state.history.deltas.len();
     let aside = run::<[u64; 2]>(map, aside)?;
     let aside: BTreeMap<u32, u64> = aside.get().iter().map(|[index, moment]| (*index as u32, *moment)).collect();
     state.history.aside = Arc::new(aside);

@@ -90,6 +90,10 @@ impl State {
                 }
             });
         }
+        if self.history.is_loose() || all && self.history.sorted < self.history.deltas.len() {
+            let State { history, pages, .. } = self;
+            history.sort(pages.all_mut().flat_map(|page| page.heads.get_mut().last.iter_mut()));
+        }
         let most = if all { 0 } else { usize::MAX };
         if all {
             self.relations.forth.settle(most);
@@ -228,7 +232,9 @@ impl State {
         let ordered = heads.flags[at] & DISORDERED == 0;
         let keys = [history::POSITION, history::ROTATION, history::REGION, history::CATEGORY, history::CONFIDENCE, history::THERE];
         let last = heads.last[at];
-        let found = if last == 0 { [None; 6] } else { self.history.at(last, ordered, keys, valid, known) };
+        let touched = heads.touched[at];
+        let never = |key: Key| touched & 1 << key == 0;
+        let found = if last == 0 { [None; 6] } else { self.history.at(last, ordered, keys, never, (valid, known)) };
         let row = self.row(id).and_then(|row| self.table.at(row));
         // What never changed is what it is now; before it was dropped, all that could be lost was written down.
         let now = |get: fn(&crate::block::Hot, usize) -> u32| row.map_or(0, |(block, row)| get(block.hot.get(), row));
@@ -252,7 +258,7 @@ impl State {
             return Sure::Unknown;
         }
         let ordered = heads.flags[at] & DISORDERED == 0;
-        match self.history.at(heads.last[at], ordered, [FIRST + state], valid, known) {
+        match self.history.at(heads.last[at], ordered, [FIRST + state], |_| false, (valid, known)) {
             [Some(value)] => history::sure(value),
             // It never changed, or only later: then its first value was written down.
             [None] if self.changed(heads.last[at], FIRST + state) => Sure::Unknown,
@@ -317,7 +323,7 @@ impl State {
     fn change(&mut self, id: Id, key: Key, new: [u32; 3], old: Option<[u32; 3]>, context: Context) -> bool {
         let Some(page) = self.pages.get_mut(id as usize / ROWS) else { return false };
         let (heads, at) = (page.heads.get_mut(), id as usize % ROWS);
-        let bit = 1u16 << if key < FIRST { key } else { 6 + (key - FIRST) % 10 };
+        let bit = bit(key);
         let mut last = heads.last[at];
         let history = &mut self.history;
         let known_before = heads.touched[at] & bit != 0
@@ -422,9 +428,7 @@ impl State {
             let of_kind = |kind: Kind| self.symbols.of_kind(kind).map(|(symbol, _)| symbol);
             let described = of_kind(Kind::Template).chain(of_kind(Kind::Affordance));
             let sets: Vec<u16> = described.map(|symbol| self.symbols.bit(symbol, false)).collect();
-            if let Some((block, at)) = self.table.at_mut(row) {
-                sets.into_iter().for_each(|set| block.bits.put(set, at, false));
-            }
+            sets.into_iter().for_each(|set| self.table.put(row, set, false));
             self.members(&Object { states: Vec::new(), ..object.clone() }, row);
         }
         let category = object.category;
@@ -444,9 +448,7 @@ impl State {
                 0 => Arc::make_mut(&mut self.symbols).make_bit(symbol, false),
                 set => set,
             };
-            if let Some((block, at)) = self.table.at_mut(row) {
-                block.bits.put(set, at, true);
-            }
+            self.table.put(row, set, true);
         }
     }
 
@@ -495,9 +497,7 @@ impl State {
         let sets: Vec<u16> = block.bits.of_row(at).collect();
         self.table.kill(old);
         let new = self.table.add(row);
-        if let Some((block, at)) = self.table.at_mut(new) {
-            sets.into_iter().for_each(|set| block.bits.put(set, at, true));
-        }
+        sets.into_iter().for_each(|set| self.table.put(new, set, true));
         if let Some(page) = self.pages.get_mut(id as usize / ROWS) {
             page.heads.get_mut().row[id as usize % ROWS] = new;
         }
@@ -515,8 +515,8 @@ impl State {
                 0 => Arc::make_mut(&mut self.symbols).make_bit(state, set),
                 number => number,
             };
-            if let Some((block, at)) = self.row(id).and_then(|row| self.table.at_mut(row)) {
-                block.bits.put(number, at, member);
+            if let Some(row) = self.row(id) {
+                self.table.put(row, number, member);
             }
         }
     }
@@ -572,10 +572,16 @@ impl State {
         if let Some(page) = self.pages.get_mut(id as usize / ROWS) {
             let heads = page.heads.get_mut();
             heads.last[id as usize % ROWS] = last;
+            heads.touched[id as usize % ROWS] |= bit(key);
             // Its moment lies before those that are in the chain already.
             heads.flags[id as usize % ROWS] |= DISORDERED;
         }
     }
+}
+
+/// The bit of a property in `touched`; symbols share the last ten.
+fn bit(key: Key) -> u16 {
+    1 << if key < FIRST { key } else { 6 + (key - FIRST) % 10 }
 }
 
 struct Checker<'s> {

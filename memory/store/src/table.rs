@@ -43,6 +43,8 @@ pub struct Table {
     pub order: Arc<Vec<u32>>,
     /// Bounds of each [`GROUP`] blocks of the base.
     pub groups: Arc<Vec<Bounds>>,
+    /// By set: one bit for each block of the base that has a member, or had one since the base was sorted.
+    pub occupied: Arc<Vec<Vec<u64>>>,
     /// Blocks of the base whose weights rose since they were ordered.
     pub risen: Arc<Vec<u32>>,
     /// Rows of the base that moved or died since it was sorted.
@@ -81,6 +83,41 @@ impl Table {
     #[inline]
     pub fn at_mut(&mut self, row: u32) -> Option<(&mut Block, usize)> {
         self.blocks.get_mut(row as usize / ROWS).map(|block| (block, row as usize % ROWS))
+    }
+    /// Puts a row into a set or takes it out.
+    pub fn put(&mut self, row: u32, set: u16, member: bool) {
+        let number = row as usize / ROWS;
+        if let Some((block, at)) = self.at_mut(row) {
+            block.bits.put(set, at, member);
+        }
+        if member && number < self.base && !self.is_occupied(set, number) {
+            let occupied = Arc::make_mut(&mut self.occupied);
+            if occupied.len() <= usize::from(set) {
+                occupied.resize(usize::from(set) + 1, Vec::new());
+            }
+            if let Some(blocks) = occupied.get_mut(usize::from(set)) {
+                blocks.resize(self.base.div_ceil(64), 0);
+                blocks[number / 64] |= 1 << (number % 64);
+            }
+        }
+    }
+    fn is_occupied(&self, set: u16, number: usize) -> bool {
+        let word = self.occupied.get(usize::from(set)).and_then(|blocks| blocks.get(number / 64));
+        word.is_some_and(|word| word >> (number % 64) & 1 == 1)
+    }
+    /// The blocks of the base that have a member of each of the sets, one bit a block.
+    pub fn candidates(&self, sets: &[u16]) -> Vec<u64> {
+        let mut all = vec![u64::MAX; self.base.div_ceil(64)];
+        if let Some(last) = all.last_mut().filter(|_| !self.base.is_multiple_of(64)) {
+            *last = (1 << (self.base % 64)) - 1;
+        }
+        for set in sets {
+            let blocks = self.occupied.get(usize::from(*set)).map(Vec::as_slice).unwrap_or_default();
+            for (at, word) in all.iter_mut().enumerate() {
+                *word &= blocks.get(at).copied().unwrap_or(0);
+            }
+        }
+        all
     }
     /// Adds a row and gives its number.
     pub fn add(&mut self, row: Row) -> u32 {
@@ -257,6 +294,20 @@ impl Table {
         let mut order: Vec<u32> = (0..bounds.len() as u32).collect();
         let weight = |number: &u32| bounds.get(*number as usize).map_or(LEAST, |bounds| bounds.weight);
         order.sort_by(|a, b| weight(b).total_cmp(&weight(a)));
+        let mut occupied: Vec<Vec<u64>> = Vec::new();
+        for (number, block) in self.blocks.iter().take(self.base).enumerate() {
+            for (set, mask) in block.bits.sets().filter(|(_, mask)| *mask != [0; 4]) {
+                let set = usize::from(set);
+                if occupied.len() <= set {
+                    occupied.resize(set + 1, Vec::new());
+                }
+                if occupied[set].is_empty() {
+                    occupied[set].resize(self.base.div_ceil(64), 0);
+                }
+                occupied[set][number / 64] |= u64::from(mask != [0; 4]) << (number % 64);
+            }
+        }
+        self.occupied = Arc::new(occupied);
         let join = |group: &[Bounds]| {
             group.iter().fold(Bounds::EMPTY, |mut all, bounds| {
                 all.join(bounds);
