@@ -117,6 +117,10 @@ impl Disk for Folder {
 pub struct Volatile(BTreeMap<String, Vec<u8>>);
 
 impl Volatile {
+    /// Puts a file there whole.
+    pub(crate) fn put(&mut self, name: String, bytes: Vec<u8>) {
+        self.0.insert(name, bytes);
+    }
     fn file(&mut self, name: &str) -> io::Result<&mut Vec<u8>> {
         self.0.get_mut(name).ok_or_else(|| io::ErrorKind::NotFound.into())
     }

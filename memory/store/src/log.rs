@@ -217,6 +217,12 @@ impl Log {
         disk.sync_folder()?;
         Ok(log)
     }
+    /// The first segment of a folder in memory, where nothing fails.
+    pub(crate) fn empty(disk: &mut crate::disk::Volatile) -> Log {
+        let place = Place { batch: 0, next: 0 };
+        disk.put(name(0), head(0, place));
+        Log { number: 0, length: SECTOR as u64, place }
+    }
     /// Where the next batch goes.
     pub fn place(&self) -> Place {
         self.place
@@ -260,7 +266,7 @@ impl Log {
                     disk.sync_folder()?;
                     break;
                 }
-                return Err(damaged(0, "the segment's head is wrong".into()));
+                return Err(damaged(0, "the segment's head is damaged".into()));
             };
             if index > 0 && begin != log.place || index == 0 && begin.next > skip.next {
                 return Err(damaged(0, format!("it begins at event {}, not at {}", begin.next, log.place.next)));

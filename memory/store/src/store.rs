@@ -101,8 +101,12 @@ impl std::fmt::Debug for Store {
 
 impl Store {
     /// A store that ends with the process.
-    pub fn in_memory() -> Result<Store, StoreError> {
-        Store::open_on(Box::new(Volatile::default()), |_, _, _| Ok(())).map(|(store, _)| store)
+    pub fn in_memory() -> Store {
+        let mut disk = Volatile::default();
+        let log = Log::empty(&mut disk);
+        let published = Reader(Arc::new(RwLock::new(Arc::new(State::default()))));
+        let (manifest, group) = (Manifest::default(), Batch::default());
+        Store { disk: Box::new(disk), state: State::default(), log, manifest, group, pending: None, broken: None, published }
     }
     /// Opens or makes a folder.
     pub fn open(path: &Path) -> Result<Store, StoreError> {

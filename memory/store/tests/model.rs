@@ -229,7 +229,7 @@ proptest! {
 #[test]
 fn readers_keep_their_view_while_the_writer_goes_on() {
     let (mut world, words) = World::new(3, 4, 6);
-    let mut store = Store::in_memory().unwrap();
+    let mut store = Store::in_memory();
     store.commit(&[words], 0).unwrap();
     let puts: Vec<Event> = (0..600).map(|id| world.put(id, 1)).collect();
     store.commit(&puts, 1).unwrap();
@@ -250,7 +250,7 @@ fn readers_keep_their_view_while_the_writer_goes_on() {
 #[test]
 fn a_refused_batch_leaves_nothing_behind() {
     let (mut world, words) = World::new(4, 2, 3);
-    let mut store = Store::in_memory().unwrap();
+    let mut store = Store::in_memory();
     store.commit(&[words], 0).unwrap();
     let source = world.words.source;
     let put = world.put(1, 1);
