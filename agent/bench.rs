@@ -2,17 +2,19 @@
 //!
 //! | module | holds |
 //! |---|---|
+//! | [`memory`] | the engine under memory at a million objects, beside SQLite, redb and roaring |
 //! | [`targets`] | floors and goals, and the comparison with them |
 //! | [`perception`] | real labelled frames, and the fixed rendered suite with its truth |
 //! | [`runtime`] | frames and messages from one to the other, the trace, restarts |
 //! | [`world`] | physics and pictures beside MuJoCo, grasps and primitives, pace, audit, snapshots |
 
+pub mod memory;
 pub mod perception;
 pub mod runtime;
 pub mod targets;
 pub mod world;
 
-use crate::cli::{BenchArgs, BenchCommand, Exit, PerceptionArgs, WorldArgs};
+use crate::cli::{BenchArgs, BenchCommand, Exit, MemoryArgs, PerceptionArgs, WorldArgs};
 use anyhow::Context;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
@@ -141,6 +143,7 @@ impl BenchResult {
 /// Runs `acm bench`. It ends with 1 if a figure misses its floor or a part could not be measured.
 pub fn run(command: &BenchCommand) -> anyhow::Result<Exit> {
     let (BenchCommand::Perception(PerceptionArgs { common: args, .. })
+    | BenchCommand::Memory(MemoryArgs { common: args, .. })
     | BenchCommand::Runtime(args)
     | BenchCommand::World(WorldArgs { common: args, .. })) = command;
     // First, so that a mistake in the file does not cost the measurement.
@@ -150,6 +153,7 @@ pub fn run(command: &BenchCommand) -> anyhow::Result<Exit> {
     };
     let result = match command {
         BenchCommand::Perception(args) => perception::measure(args, &targets),
+        BenchCommand::Memory(args) => memory::measure(args),
         BenchCommand::Runtime(args) => runtime::measure(args),
         BenchCommand::World(args) => world::measure(args),
     };

@@ -395,6 +395,8 @@ pub fn exit_of_error(error: &anyhow::Error) -> Exit {
 pub enum BenchCommand {
     /// Real labelled frames and foreign meshes (found through the variable ACM_DATA), and rendered tables with their truth.
     Perception(PerceptionArgs),
+    /// The engine under memory at 1e4, 1e5 and 1e6 objects: questions, commits, recovery, power failures, forgetting.
+    Memory(MemoryArgs),
     /// Frames between processes, messages between actors, what a trace costs, how fast an actor is replaced.
     Runtime(BenchArgs),
     /// Physics beside MuJoCo, grasps, primitives, rendering, pace, physics audit, snapshots.
@@ -416,6 +418,17 @@ pub struct BenchArgs {
     /// Compare with the targets of this file instead of the built-in ones.
     #[arg(long, value_name = "FILE")]
     pub against: Option<PathBuf>,
+}
+
+/// Arguments of `acm bench memory`.
+#[derive(Debug, Args)]
+pub struct MemoryArgs {
+    /// What every bench takes.
+    #[command(flatten)]
+    pub common: BenchArgs,
+    /// Draw cost against the number of objects into this file.
+    #[arg(long, value_name = "FILE.svg")]
+    pub plot: Option<PathBuf>,
 }
 
 /// Arguments of `acm bench perception`.

@@ -84,7 +84,7 @@ impl Drop for Peer {
 }
 
 /// The Python that is asked: the one that is named, the one that `scripts/peers.sh` makes, or the system's.
-fn python() -> PathBuf {
+pub fn python() -> PathBuf {
     if let Some(named) = std::env::var_os(PYTHON) {
         return named.into();
     }

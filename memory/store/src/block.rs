@@ -95,7 +95,7 @@ pub struct Block {
 impl Block {
     /// A block without objects.
     pub fn empty() -> Block {
-        let mut hot: Box<Hot> = bytemuck::zeroed_box();
+        let mut hot: Box<Hot> = Box::new(Zeroable::zeroed());
         hot.bounds = Bounds::EMPTY;
         hot.id = [NONE; ROWS];
         Block { hot: Stored::Owned(hot), bits: Bits::default() }

@@ -110,9 +110,7 @@ impl<T: Pod> Stored<T> {
     #[inline]
     pub fn get_mut(&mut self) -> &mut T {
         if let Stored::Mapped(..) = self {
-            let mut copy: Box<T> = bytemuck::zeroed_box();
-            *copy = *self.get();
-            *self = Stored::Owned(copy);
+            *self = Stored::Owned(Box::new(*self.get()));
         }
         match self {
             Stored::Owned(value) => value,

@@ -165,9 +165,12 @@ pub struct Place {
     pub next: u64,
 }
 
-fn head(number: u64, place: Place) -> Vec<u8> {
+/// `first` is the number of the first segment of the log that this one belongs to: one that a rewrite left unfinished is
+/// told from one that goes on.
+fn head(number: u64, first: u64, place: Place) -> Vec<u8> {
     let mut bytes = MAGIC.to_vec();
     bytes.extend(number.to_le_bytes());
+    bytes.extend(first.to_le_bytes());
     bytes.extend(place.batch.to_le_bytes());
     bytes.extend(place.next.to_le_bytes());
     bytes.extend(crc32c::crc32c(&bytes).to_le_bytes());
@@ -175,11 +178,12 @@ fn head(number: u64, place: Place) -> Vec<u8> {
     bytes
 }
 
-fn read_head(bytes: &[u8], of: u64) -> Option<Place> {
-    let (sum, check) = bytes.get(..36)?.split_at_checked(32)?;
+fn read_head(bytes: &[u8], of: u64) -> Option<(u64, Place)> {
+    let (sum, check) = bytes.get(..44)?.split_at_checked(40)?;
     let number = |at: usize| Some(u64::from_le_bytes(*sum.get(at..)?.first_chunk::<8>()?));
     let right = sum.starts_with(MAGIC) && crc32c::crc32c(sum).to_le_bytes() == check && number(8)? == of;
-    right.then_some(Place { batch: number(16)?, next: number(24)? })
+    let place = Place { batch: number(24)?, next: number(32)? };
+    right.then_some((number(16)?, place))
 }
 
 /// Why a log cannot be read.
@@ -203,6 +207,7 @@ pub enum LogError {
 /// The open end of a log.
 #[derive(Debug)]
 pub struct Log {
+    first: u64,
     number: u64,
     length: u64,
     place: Place,
@@ -211,17 +216,20 @@ pub struct Log {
 impl Log {
     /// Begins a log with its first segment.
     pub fn begin(disk: &mut dyn Disk, number: u64, place: Place) -> io::Result<Log> {
-        let mut log = Log { number, length: 0, place };
+        let mut log = Log { first: number, number, length: 0, place };
         log.next_segment(disk, number)?;
-        disk.sync(&name(number))?;
-        disk.sync_folder()?;
         Ok(log)
+    }
+    /// Ends the present segment and begins the next.
+    pub fn turn(&mut self, disk: &mut dyn Disk) -> io::Result<()> {
+        disk.sync(&name(self.number))?;
+        self.next_segment(disk, self.number + 1)
     }
     /// The first segment of a folder in memory, where nothing fails.
     pub(crate) fn empty(disk: &mut crate::disk::Volatile) -> Log {
         let place = Place { batch: 0, next: 0 };
-        disk.put(name(0), head(0, place));
-        Log { number: 0, length: SECTOR as u64, place }
+        disk.put(name(0), head(0, 0, place));
+        Log { first: 0, number: 0, length: SECTOR as u64, place }
     }
     /// Where the next batch goes.
     pub fn place(&self) -> Place {
@@ -238,34 +246,44 @@ impl Log {
 
     /// Reads the committed batches of all segments from `first` on, gives the events of each part with the number of the
     /// first and the time at which they came to be known, and cuts off what was never acknowledged. Batches before `skip`
-    /// are passed over.
+    /// are passed over. `log_first` is the first segment of the whole log: others are left over from a rewrite.
     pub fn open(
         disk: &mut dyn Disk,
-        first: u64,
+        (log_first, first): (u64, u64),
         skip: Place,
         mut take: impl FnMut(u64, Nanos, &[&[u8]]) -> Result<(), String>,
     ) -> Result<Log, LogError> {
         let mut numbers: Vec<u64> = disk.list()?.iter().filter_map(|name| number(name)).collect();
         numbers.retain(|number| *number >= first);
         numbers.sort_unstable();
-        let mut log = Log { number: first, length: 0, place: skip };
+        let ours = |number: &u64, disk: &dyn Disk| -> io::Result<bool> {
+            Ok(read_head(disk.map(&name(*number))?.bytes(), *number).is_some_and(|(belongs, _)| belongs == log_first))
+        };
+        let mut end = numbers.len();
+        while end > 1 && !ours(&numbers[end - 1], disk)? {
+            end -= 1;
+        }
+        let mut log = Log { first: log_first, number: first, length: 0, place: skip };
         for (index, number) in numbers.iter().enumerate() {
             let file = name(*number);
             let damaged = |byte: usize, reason: String| LogError::Damaged { file: file.clone(), byte: byte as u64, reason };
-            let last = index + 1 == numbers.len();
+            let last = index + 1 >= end;
             if *number != first + index as u64 {
                 return Err(damaged(0, format!("the segment before it, {}, is missing", name(first + index as u64))));
             }
             let map = disk.map(&file)?;
             let bytes = map.bytes();
-            let Some(begin) = read_head(bytes, *number) else {
-                if last && index > 0 && !has_commit(bytes, 0) {
-                    // A segment whose beginning never reached the disk.
-                    drop(map);
-                    disk.remove(&file)?;
-                    disk.sync_folder()?;
-                    break;
-                }
+            let left_over = match read_head(bytes, *number) {
+                Some((belongs, _)) => belongs != log_first && index > 0,
+                None => last && index > 0 && !has_commit(bytes, 0),
+            };
+            if left_over {
+                drop(map);
+                disk.remove(&file)?;
+                disk.sync_folder()?;
+                continue;
+            }
+            let Some((_, begin)) = read_head(bytes, *number) else {
                 return Err(damaged(0, "the segment's head is damaged".into()));
             };
             if index > 0 && begin != log.place || index == 0 && begin.next > skip.next {
@@ -332,9 +350,7 @@ impl Log {
     pub fn write(&mut self, disk: &mut dyn Disk, bytes: &[u8], place: Place) -> io::Result<()> {
         if self.length + bytes.len() as u64 > SEGMENT_BYTES && self.length > SECTOR as u64 {
             // What is in the full segment must be on disk before the next one exists.
-            disk.sync(&name(self.number))?;
-            self.next_segment(disk, self.number + 1)?;
-            disk.sync_folder()?;
+            self.turn(disk)?;
         }
         disk.append(&name(self.number), bytes)?;
         self.length += bytes.len() as u64;
@@ -349,7 +365,10 @@ impl Log {
     fn next_segment(&mut self, disk: &mut dyn Disk, number: u64) -> io::Result<()> {
         let file = name(number);
         disk.create(&file)?;
-        disk.append(&file, &head(number, self.place))?;
+        disk.append(&file, &head(number, self.first, self.place))?;
+        // A head that did not reach the disk has nothing behind it.
+        disk.sync(&file)?;
+        disk.sync_folder()?;
         (self.number, self.length) = (number, SECTOR as u64);
         Ok(())
     }

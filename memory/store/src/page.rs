@@ -46,7 +46,7 @@ pub struct Page {
 impl Page {
     /// A page of ids that were never given.
     pub fn empty() -> Page {
-        let mut heads: Box<Heads> = bytemuck::zeroed_box();
+        let mut heads: Box<Heads> = Box::new(Zeroable::zeroed());
         heads.row = [NONE; ROWS];
         Page { heads: Stored::Owned(heads), parts: Run::default() }
     }

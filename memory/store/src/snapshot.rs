@@ -18,7 +18,8 @@ use bytemuck::{Pod, Zeroable};
 use std::{collections::BTreeMap, sync::Arc};
 
 const MAGIC: [u8; 8] = *b"ACM-SNP2";
-const SECTIONS: usize = 19;
+/// Room for more sections than there are.
+const SECTIONS: usize = 32;
 const ALIGN: usize = 64;
 
 /// Name of a snapshot.
@@ -163,7 +164,7 @@ pub fn read(map: Arc<Map>) -> Result<Found, String> {
     if u64::from(head_check(&head)) != head.check {
         return Err("its head has a wrong checksum".into());
     }
-    for (number, section) in head.sections.iter().enumerate() {
+    for (number, section) in head.sections.iter().enumerate().filter(|(_, section)| section.length > 0) {
         let bytes = map.slice::<u8>(section.at as usize, section.length as usize);
         let bytes = bytes.ok_or_else(|| format!("section {number} does not fit into the file"))?;
         if u64::from(crc32c::crc32c(bytes)) != section.check {
@@ -175,7 +176,7 @@ pub fn read(map: Arc<Map>) -> Result<Found, String> {
 
 fn unpack(map: &Arc<Map>, head: &Head) -> Option<Found> {
     let [words, hot, slots, masks, mask_ends, heads, parts, part_ends, spans, forth, back, numbers, deltas, wide, aside, commits, points, planes, rest] =
-        head.sections;
+        *head.sections.first_chunk::<19>()?;
     let bytes = |section: Section| map.slice::<u8>(section.at as usize, section.length as usize);
     let mut symbols: Symbols = serde_json::from_slice(bytes(words)?).ok()?;
     symbols.reindex();

@@ -727,3 +727,27 @@ impl Checker<'_> {
 fn finite<'a>(values: impl IntoIterator<Item = &'a f32>) -> Result<(), String> {
     if values.into_iter().all(|value| value.is_finite()) { Ok(()) } else { Err("a number is not finite".into()) }
 }
+
+/// Bytes of memory that a state takes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Bytes {
+    /// What queries read: columns, bitsets, positions, ids, relations, numbers, words.
+    pub hot: usize,
+    /// Parts.
+    pub parts: usize,
+    /// Changes.
+    pub history: usize,
+}
+
+impl State {
+    /// How much memory this state takes.
+    pub fn bytes(&self) -> Bytes {
+        let heads = self.pages.len() * (size_of::<Heads>() + 64);
+        let related = self.relations.forth.bytes() + self.relations.back.bytes() + self.numbers.bytes();
+        Bytes {
+            hot: self.table.bytes() + self.space.bytes() + heads + related + self.symbols.bytes(),
+            parts: self.pages.iter().map(|page| size_of_val(page.parts.get())).sum(),
+            history: self.history.bytes(),
+        }
+    }
+}

@@ -153,7 +153,7 @@ impl Store {
         }
         let skip = Place { batch, next: state.next };
         let first = manifest.snapshot.unwrap_or(manifest.first);
-        let log = Log::open(&mut *disk, first, skip, |first, time, bodies| {
+        let log = Log::open(&mut *disk, (manifest.first, first), skip, |first, time, bodies| {
             let mut events = Vec::with_capacity(bodies.len());
             for (number, body) in (first..).zip(bodies) {
                 events.push(event::read(body).ok_or_else(|| format!("record {number} is no event"))?);
@@ -264,7 +264,7 @@ impl Store {
         self.disk.append(fresh, bytes)?;
         self.disk.sync(fresh)?;
         self.disk.rename(fresh, &file)?;
-        self.log = Log::begin(&mut *self.disk, number, self.log.place())?;
+        self.log.turn(&mut *self.disk)?;
         let old = self.manifest.snapshot.replace(number);
         self.manifest.write(&mut *self.disk)?;
         if let Some(old) = old {
@@ -279,7 +279,7 @@ impl Store {
         self.flush()?;
         let mut all = Vec::new();
         let start = Place { batch: 0, next: 0 };
-        let read = Log::open(&mut *self.disk, self.manifest.first, start, |_, time, bodies| {
+        let read = Log::open(&mut *self.disk, (self.manifest.first, self.manifest.first), start, |_, time, bodies| {
             for body in bodies {
                 all.push((time, event::read(body).ok_or("a record is no event")?));
             }

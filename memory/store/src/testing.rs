@@ -1,5 +1,6 @@
 //! For tests and benches: numbers from seeds, worlds drawn from them, a disk that fails, and a naive reference.
 
+pub mod crash;
 pub mod faults;
 pub mod naive;
 pub mod worlds;
