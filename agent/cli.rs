@@ -2,6 +2,7 @@
 
 #[cfg(feature = "learned")]
 pub mod learn;
+pub mod memory;
 pub mod trace;
 
 use crate::{
@@ -83,6 +84,9 @@ pub enum Command {
     /// Run the simulator in a process of its own.
     #[command(subcommand)]
     Sim(SimCommand),
+    /// Ask, check, export and forget what a memory folder holds.
+    #[command(subcommand)]
+    Memory(memory::MemoryCommand),
     /// Look into the traces that `acm run --trace` writes.
     #[command(subcommand)]
     Trace(trace::TraceCommand),
@@ -477,6 +481,7 @@ pub fn run(cli: Cli) -> anyhow::Result<Exit> {
         Command::Scenario(command) => scenario::run(&command),
         Command::Library(args) => library::run(&args),
         Command::Sim(SimCommand::Serve(args)) => serve::run(&args),
+        Command::Memory(command) => crate::memory::run(&command),
         Command::Trace(command) => crate::trace::run(&command),
         Command::Bench(command) => bench::run(&command),
         #[cfg(feature = "learned")]

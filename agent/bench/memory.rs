@@ -83,6 +83,7 @@ fn wall_us() -> f64 {
 /// Median and 99th percentile of times as a row of a size.
 fn row(name: &str, size: u32, times_us: &[f64]) -> Row {
     let (p50, p99) = median_and(0.99, times_us);
-    let values = [("p50_us", p50), ("p99_us", p99), ("repetitions", times_us.len() as f64), ("objects", f64::from(size))];
+    let values =
+        [("p50_us", p50), ("p99_us", p99), ("repetitions", times_us.len() as f64), ("objects", f64::from(size))];
     Row { group: Some(format!("{size}")), ..Row::new(name, values) }
 }

@@ -80,8 +80,10 @@ impl Ledger {
     /// Writes the log anew without some objects and what was done to them; gives the events that are left.
     pub(crate) fn forget(&mut self, gone: &BTreeSet<ObjectId>) -> Result<Vec<Event>, MemoryError> {
         let mut dropped = Dropped::new(gone);
-        let kept: Vec<Event> =
-            all_events(&self.path, &mut self.store)?.into_iter().filter_map(|e| redact::event(e, &mut dropped)).collect();
+        let kept: Vec<Event> = all_events(&self.path, &mut self.store)?
+            .into_iter()
+            .filter_map(|e| redact::event(e, &mut dropped))
+            .collect();
         self.replace(&kept)?;
         Ok(kept)
     }

@@ -54,10 +54,10 @@ mod view;
 pub use hand::HandFeeling;
 pub use identity::{IdentityRule, MAX_PERCEPTS};
 pub use joint::FeltJoint;
+pub use ledger::{FORMAT, open_store, read_events, store_time};
 pub use library::{
     CORE, LibraryError, MAX_TEMPLATE_FILES, default_library, library_from_dir, library_groups, library_of,
 };
-pub use ledger::{FORMAT, open_store, read_events, store_time};
 pub use memory::AcmMemory;
 pub use project::{CONCLUSIONS, FRAMES, TRANSITIONS, moment, narrow};
 pub use recent::{MAX_RECENT, Recent};

@@ -135,9 +135,7 @@ impl AcmMemory {
 
     /// Refuses a batch that could not be read back: it would make the whole log unreadable.
     fn check(&self, events: &[Event], fault: Option<String>) -> Result<(), MemoryError> {
-        let refuse = |reason| {
-            Err(MemoryError::Record { path: self.ledger.path().into(), record: 0, reason })
-        };
+        let refuse = |reason| Err(MemoryError::Record { path: self.ledger.path().into(), record: 0, reason });
         if let Some(reason) = fault {
             return refuse(reason);
         }

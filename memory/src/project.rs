@@ -29,7 +29,10 @@ const EPISODE_BITS: u32 = 48;
 /// A moment on the engine's time axis.
 pub(crate) fn moment_ns(moment: Moment) -> Result<u64, String> {
     if moment.time.0 >> EPISODE_BITS != 0 || u64::from(moment.episode) >> (64 - EPISODE_BITS) != 0 {
-        return Err(format!("the moment {} of run {} lies beyond 78 hours or 65,535 runs", moment.time, moment.episode));
+        return Err(format!(
+            "the moment {} of run {} lies beyond 78 hours or 65,535 runs",
+            moment.time, moment.episode
+        ));
     }
     Ok(u64::from(moment.episode) << EPISODE_BITS | moment.time.0)
 }
@@ -69,8 +72,7 @@ impl Projector {
                 state.apply(&define, time);
                 batch.push(define);
             }
-            let document =
-                serde_json::to_vec(event).map_err(|error| format!("an event has no JSON: {error}"))?;
+            let document = serde_json::to_vec(event).map_err(|error| format!("an event has no JSON: {error}"))?;
             let mut stored = acm_store::Event::new(moment_ns(event.moment)?, source, confidence, ops);
             stored.evidence = event.evidence.iter().take(stored::MAX_EVIDENCE).map(evidence).collect();
             stored.about = mentioned(&document).into_iter().take(stored::MAX_OPS).collect();
@@ -196,7 +198,8 @@ fn object(words: &mut Words<'_>, entry: &ObjectEntry) -> Vec<Op> {
         }
     } else {
         let states = Vec::new();
-        let object = stored::Object { id, category, region: 0, position, rotation, confidence, parts, affordances, states };
+        let object =
+            stored::Object { id, category, region: 0, position, rotation, confidence, parts, affordances, states };
         ops.push(Op::Put(Box::new(object)));
     }
     let flags = [

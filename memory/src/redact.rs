@@ -93,15 +93,21 @@ pub(crate) fn event(mut event: Event, dropped: &mut Dropped<'_>) -> Option<Event
         }
         Change::Skill(skill) => {
             skill.transitions.retain(|id| !dropped.transitions.contains(id));
-            skill.preconditions.retain(|literal| !literal.arguments.iter().any(|term| match term {
-                Term::Object(id) => dropped.has(*id),
-                Term::Part(part) => dropped.has(part.object),
-                _ => false,
-            }));
+            skill.preconditions.retain(|literal| {
+                !literal.arguments.iter().any(|term| match term {
+                    Term::Object(id) => dropped.has(*id),
+                    Term::Part(part) => dropped.has(part.object),
+                    _ => false,
+                })
+            });
         }
         Change::Frame(glance) => glance.visibility.retain(|(id, _)| !dropped.has(*id)),
         Change::Forgotten(forget) => forget.objects.retain(|id| !dropped.has(*id)),
-        Change::EpisodeBegan | Change::Instructed { .. } | Change::SubtaskDone { .. } | Change::Support(_) | Change::Wiped(_) => {}
+        Change::EpisodeBegan
+        | Change::Instructed { .. }
+        | Change::SubtaskDone { .. }
+        | Change::Support(_)
+        | Change::Wiped(_) => {}
     }
     // Sentences of failures and verdicts may name it too: an event that still does goes as a whole.
     if dropped.speaks_of(&event) {

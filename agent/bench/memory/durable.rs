@@ -74,7 +74,9 @@ fn ingest(size: u32, path: &Path, result: &mut BenchResult) -> anyhow::Result<()
         ("bytes_per_event", store.disk_bytes()? as f64 / f64::from(size)),
         ("objects", f64::from(objects)),
     ];
-    result.rows.push(Row { group: Some("ingest".into()), ..Row::new("1,000 events a batch, each synchronised", values) });
+    result
+        .rows
+        .push(Row { group: Some("ingest".into()), ..Row::new("1,000 events a batch, each synchronised", values) });
     result.figure("durable_events_per_s", count as f64 / wall * 1e6);
     Ok(())
 }
@@ -96,7 +98,8 @@ fn recovery(size: u32, path: &Path, result: &mut BenchResult) -> anyhow::Result<
         walls.push(wall * 1e-6);
         cpus.push(cpu * 1e-6);
     }
-    let values = [("wall_s", median_and(0.5, &walls).0), ("cpu_s", median_and(0.5, &cpus).0), ("events", events as f64)];
+    let values =
+        [("wall_s", median_and(0.5, &walls).0), ("cpu_s", median_and(0.5, &cpus).0), ("events", events as f64)];
     result.rows.push(Row { group: Some("recovery".into()), ..Row::new("from the log", values) });
     result.figure("recover_log_1e6_s", median_and(0.5, &walls).0);
     // A snapshot of as many objects as the world has.
@@ -116,7 +119,8 @@ fn recovery(size: u32, path: &Path, result: &mut BenchResult) -> anyhow::Result<
         walls.push(wall * 1e-3);
         cpus.push(cpu * 1e-3);
     }
-    let values = [("wall_ms", median_and(0.5, &walls).0), ("cpu_ms", median_and(0.5, &cpus).0), ("objects", f64::from(size))];
+    let values =
+        [("wall_ms", median_and(0.5, &walls).0), ("cpu_ms", median_and(0.5, &cpus).0), ("objects", f64::from(size))];
     result.rows.push(Row { group: Some("recovery".into()), ..Row::new("from a snapshot to the first answer", values) });
     result.figure("recover_snapshot_ms", median_and(0.5, &walls).0);
     Ok(())
@@ -127,7 +131,8 @@ fn failures(quick: bool, result: &mut BenchResult) {
     let bar = progress("power failures", points);
     let outcome = crash::run(points, SEED, || bar.inc(1));
     bar.finish_and_clear();
-    let values = [("points", outcome.points as f64), ("lost", outcome.lost as f64), ("refused", outcome.refused as f64)];
+    let values =
+        [("points", outcome.points as f64), ("lost", outcome.lost as f64), ("refused", outcome.refused as f64)];
     result.rows.push(Row { group: Some("failures".into()), ..Row::new("power fails anywhere", values) });
     result.errors.extend(outcome.first.map(|reason| format!("a power failure: {reason}")));
     result.figure("lost_commits", (outcome.lost + outcome.refused) as f64);
@@ -140,7 +145,8 @@ fn forgetting(result: &mut BenchResult) -> anyhow::Result<()> {
     let (mut world, words) = World::new(SEED, 8, 20);
     store.commit(&[words], 0)?;
     let guest = store.state().symbols.next();
-    store.commit(&[Event::new(0, 0, 1.0, vec![Op::Define(acm_store::Kind::Source, "guest-of-the-house".into())])], 0)?;
+    store
+        .commit(&[Event::new(0, 0, 1.0, vec![Op::Define(acm_store::Kind::Source, "guest-of-the-house".into())])], 0)?;
     let mut needles: Vec<Vec<u8>> = vec![b"guest-of-the-house".to_vec(), b"room-3".to_vec()];
     let region = world.words.regions.get(3).copied().unwrap_or_default();
     let mut objects = Vec::new();
@@ -165,7 +171,10 @@ fn forgetting(result: &mut BenchResult) -> anyhow::Result<()> {
         for entry in fs::read_dir(folder.path())? {
             bytes.extend(fs::read(entry?.path())?);
         }
-        Ok(needles.iter().filter(|needle| bytes.windows(needle.len()).any(|window| window == needle.as_slice())).count())
+        Ok(needles
+            .iter()
+            .filter(|needle| bytes.windows(needle.len()).any(|window| window == needle.as_slice()))
+            .count())
     };
     let before = found(&needles)?;
     store.forget(&Forget { objects, regions: vec![region], sources: vec![guest] }, |_, _| None)?;

@@ -16,7 +16,13 @@ use std::{
 const SQLITE: &str = include_str!("../../../scripts/peers/sqlite_memory.py");
 
 /// Measures the peers at one size. One that is not there is a row that says why.
-pub fn measure(size: u32, world: &mut World, state: &State, quick: bool, result: &mut BenchResult) -> anyhow::Result<()> {
+pub fn measure(
+    size: u32,
+    world: &mut World,
+    state: &State,
+    quick: bool,
+    result: &mut BenchResult,
+) -> anyhow::Result<()> {
     let queries: Vec<Query> = (0..if quick { 200 } else { 1000 }).map(|_| world.scoped()).collect();
     match sqlite(state, &queries) {
         Ok(told) => {
@@ -30,9 +36,14 @@ pub fn measure(size: u32, world: &mut World, state: &State, quick: bool, result:
             ];
             result.rows.push(Row { group: Some(format!("{size}")), ..Row::new("SQLite, scoped", values) });
             let version = told["version"].as_str().unwrap_or("?");
-            result.notes.push(format!("SQLite {version} in memory: an index on (category, region), masks, math functions"));
+            result
+                .notes
+                .push(format!("SQLite {version} in memory: an index on (category, region), masks, math functions"));
             if number("equal") < 1.0 {
-                result.errors.push(format!("SQLite gives other answers for {:.1} % of the questions", 100.0 * (1.0 - number("equal"))));
+                result.errors.push(format!(
+                    "SQLite gives other answers for {:.1} % of the questions",
+                    100.0 * (1.0 - number("equal"))
+                ));
             }
         }
         Err(error) => result.rows.push(Row::skipped("SQLite, scoped", format!("{error:#}"))),
@@ -56,7 +67,9 @@ pub fn compare(result: &mut BenchResult) {
     let of = |result: &BenchResult, name: &str, value: &str| -> Option<f64> {
         result.rows.iter().find(|row| row.name == name).and_then(|row| row.values.get(value).copied())
     };
-    if let (Some(other), Some(own)) = (of(result, "SQLite, scoped", "p50_us"), result.figures.get("scoped_query_p50_us").copied()) {
+    if let (Some(other), Some(own)) =
+        (of(result, "SQLite, scoped", "p50_us"), result.figures.get("scoped_query_p50_us").copied())
+    {
         result.figure("scoped_query_times_faster_than_sqlite", other / own);
     }
     let own = result.figures.get("durable_events_per_s").copied();
@@ -86,7 +99,12 @@ fn sqlite(state: &State, queries: &[Query]) -> anyhow::Result<Value> {
     let task = folder.path().join("task");
     std::fs::write(&task, serde_json::to_vec(&questions)?)?;
     let bar = progress("SQLite", 1);
-    let output = Command::new(python()).args(["-c", SQLITE]).arg(&rows).arg(&task).output().context("Python cannot be started")?;
+    let output = Command::new(python())
+        .args(["-c", SQLITE])
+        .arg(&rows)
+        .arg(&task)
+        .output()
+        .context("Python cannot be started")?;
     bar.finish_and_clear();
     if !output.status.success() {
         bail!("{}", String::from_utf8_lossy(&output.stderr).lines().last().unwrap_or("it ended without a word"));

@@ -40,18 +40,36 @@ fn svg(result: &BenchResult) -> String {
         let at = y(f64::from(power));
         let right = x(last);
         add(format_args!("<path d=\"M{LEFT} {at}H{right}\" stroke=\"#ddd\"/>"));
-        add(format_args!("<text x=\"{}\" y=\"{}\" text-anchor=\"end\">{} us</text>\n", LEFT - 6.0, at + 4.0, 10f64.powi(power)));
+        add(format_args!(
+            "<text x=\"{}\" y=\"{}\" text-anchor=\"end\">{} us</text>\n",
+            LEFT - 6.0,
+            at + 4.0,
+            10f64.powi(power)
+        ));
     }
     for power in (first.round() as i32)..=(last.round() as i32) {
         let at = x(f64::from(power));
-        add(format_args!("<text x=\"{at}\" y=\"{}\" text-anchor=\"middle\">1e{power}</text>\n", HEIGHT - BOTTOM + 18.0));
+        add(format_args!(
+            "<text x=\"{at}\" y=\"{}\" text-anchor=\"middle\">1e{power}</text>\n",
+            HEIGHT - BOTTOM + 18.0
+        ));
     }
-    add(format_args!("<text x=\"{LEFT}\" y=\"{}\">objects; median processor time of one question</text>\n", HEIGHT - 12.0));
+    add(format_args!(
+        "<text x=\"{LEFT}\" y=\"{}\">objects; median processor time of one question</text>\n",
+        HEIGHT - 12.0
+    ));
     for ((name, points), color) in lines.iter().zip(COLORS.iter().cycle()) {
         let path: Vec<String> = points.iter().map(|(px, py)| format!("{:.1},{:.1}", x(*px), y(*py))).collect();
-        add(format_args!("<polyline points=\"{}\" fill=\"none\" stroke=\"{color}\" stroke-width=\"2\"/>", path.join(" ")));
+        add(format_args!(
+            "<polyline points=\"{}\" fill=\"none\" stroke=\"{color}\" stroke-width=\"2\"/>",
+            path.join(" ")
+        ));
         if let Some((px, py)) = points.last() {
-            add(format_args!("<text x=\"{:.1}\" y=\"{:.1}\" fill=\"{color}\">{name}</text>\n", x(*px) + 6.0, y(*py) + 4.0));
+            add(format_args!(
+                "<text x=\"{:.1}\" y=\"{:.1}\" fill=\"{color}\">{name}</text>\n",
+                x(*px) + 6.0,
+                y(*py) + 4.0
+            ));
         }
     }
     out + "</svg>\n"

@@ -348,7 +348,10 @@ fn the_engines_columns_hold_what_is_believed() {
 fn check_columns(memory: &AcmMemory) {
     use acm_store::{Kind, event::Sure};
     let (columns, view) = (memory.columns(), memory.view());
-    assert_eq!(columns.ids().map(u64::from).collect::<Vec<_>>(), view.objects().iter().map(|o| o.id.0).collect::<Vec<_>>());
+    assert_eq!(
+        columns.ids().map(u64::from).collect::<Vec<_>>(),
+        view.objects().iter().map(|o| o.id.0).collect::<Vec<_>>()
+    );
     for entry in view.objects() {
         let id = crate::narrow(entry.id).unwrap();
         let object = columns.object(id).unwrap();
@@ -356,7 +359,9 @@ fn check_columns(memory: &AcmMemory) {
         assert_eq!(object.position, entry.pose().unwrap().translation.as_vec3().to_array());
         assert!((f64::from(object.confidence) - entry.confidence).abs() < 1e-3);
         assert_eq!(object.parts.len(), entry.parts.len());
-        for (word, presence) in [("present", Presence::Present), ("held", Presence::Held), ("missing", Presence::Missing)] {
+        for (word, presence) in
+            [("present", Presence::Present), ("held", Presence::Held), ("missing", Presence::Missing)]
+        {
             let state = columns.symbols.find(Kind::State, word).unwrap();
             assert_eq!(columns.sure(id, state) == Sure::Yes, entry.presence == presence, "{id} {word}");
         }

@@ -45,7 +45,18 @@ fn main() {
     let view = store.view();
     println!("settle {:.1} ms", began.elapsed().as_secs_f64() * 1e3);
     for (name, scoped) in [("scoped", 0), ("unscoped near", 1), ("unscoped", 2)] {
-        let queries: Vec<_> = (0..2000).map(|_| if scoped == 0 { world.scoped() } else { let mut q = world.unscoped(); let near = world.scoped().near; q.near = if scoped == 1 { near } else { None }; q }).collect();
+        let queries: Vec<_> = (0..2000)
+            .map(|_| {
+                if scoped == 0 {
+                    world.scoped()
+                } else {
+                    let mut q = world.unscoped();
+                    let near = world.scoped().near;
+                    q.near = if scoped == 1 { near } else { None };
+                    q
+                }
+            })
+            .collect();
         let (mut scored, mut hits) = (0, 0);
         let mut times = Vec::new();
         for _ in 0..3 {
@@ -59,7 +70,12 @@ fn main() {
         }
         println!("{name}: {:?} us, scored {} hits {}", percentiles(times), scored / 6000, hits / 6000);
     }
-    let places: Vec<_> = (0..2000).map(|_| { let room = world.draw.below(64); world.place(room) }).collect();
+    let places: Vec<_> = (0..2000)
+        .map(|_| {
+            let room = world.draw.below(64);
+            world.place(room)
+        })
+        .collect();
     let mut times = Vec::new();
     for _ in 0..3 {
         times.clear();
@@ -71,16 +87,25 @@ fn main() {
     }
     println!("nearest: {:?} us", percentiles(times));
     drop(view);
-    println!("table {} space {} bytes/object", store.state().table.bytes() / count as usize, store.state().space.bytes() / count as usize);
+    println!(
+        "table {} space {} bytes/object",
+        store.state().table.bytes() / count as usize,
+        store.state().space.bytes() / count as usize
+    );
     let touched = (count as usize / 10).max(1000);
-    let changes: Vec<Event> = (0..count).map(|n| world.change(touched, 2_000_000 + u64::from(n / 1000) * 1000)).collect();
+    let changes: Vec<Event> =
+        (0..count).map(|n| world.change(touched, 2_000_000 + u64::from(n / 1000) * 1000)).collect();
     let began = Instant::now();
     for batch in changes.chunks(1000) {
         store.enqueue(batch, batch.last().unwrap().valid).unwrap();
         store.flush().unwrap();
     }
     let took = began.elapsed().as_secs_f64();
-    println!("changes: {:.0}/s, history {:.1} bytes/event", f64::from(count) / took, store.state().history.bytes() as f64 / f64::from(count));
+    println!(
+        "changes: {:.0}/s, history {:.1} bytes/event",
+        f64::from(count) / took,
+        store.state().history.bytes() as f64 / f64::from(count)
+    );
     store.view();
     let mut draw = Draw::new(7);
     let mut times = Vec::new();
@@ -103,6 +128,10 @@ fn main() {
         let began = Instant::now();
         let store = Store::open(folder.path()).unwrap();
         let answer = execute::answer(store.state(), &world.scoped());
-        println!("open from snapshot to first query: {:.1} ms ({} hits)", began.elapsed().as_secs_f64() * 1e3, answer.hits.len());
+        println!(
+            "open from snapshot to first query: {:.1} ms ({} hits)",
+            began.elapsed().as_secs_f64() * 1e3,
+            answer.hits.len()
+        );
     }
 }

@@ -1,6 +1,10 @@
 //! 256 objects: their hot columns, bitsets of what holds of them, and bounds by which a whole block is passed over.
 
-use crate::{Id, NONE, cow::{Run, Stored}, symbols::Symbol};
+use crate::{
+    Id, NONE,
+    cow::{Run, Stored},
+    symbols::Symbol,
+};
 use bytemuck::{Pod, Zeroable};
 
 /// Objects of one block.
@@ -52,7 +56,8 @@ pub struct Bounds {
 
 impl Bounds {
     /// Of nothing.
-    pub const EMPTY: Bounds = Bounds { min: [f32::INFINITY; 3], max: [f32::NEG_INFINITY; 3], weight: f32::NEG_INFINITY };
+    pub const EMPTY: Bounds =
+        Bounds { min: [f32::INFINITY; 3], max: [f32::NEG_INFINITY; 3], weight: f32::NEG_INFINITY };
 
     /// Takes in a position with a weight.
     #[inline]
@@ -201,7 +206,8 @@ pub fn rows(mask: Mask) -> impl Iterator<Item = usize> {
 pub fn span(first: usize, end: usize) -> Mask {
     let mut mask = [0; 4];
     for (word, bits) in mask.iter_mut().enumerate() {
-        let (low, high) = (first.clamp(64 * word, 64 * word + 64) - 64 * word, end.clamp(64 * word, 64 * word + 64) - 64 * word);
+        let (low, high) =
+            (first.clamp(64 * word, 64 * word + 64) - 64 * word, end.clamp(64 * word, 64 * word + 64) - 64 * word);
         if low < high {
             let ones = if high - low == 64 { u64::MAX } else { (1u64 << (high - low)) - 1 };
             *bits = ones << low;

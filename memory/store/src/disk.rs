@@ -81,8 +81,7 @@ impl Disk for Folder {
         Map::of_reader(&mut file, length)
     }
     fn create(&mut self, name: &str) -> io::Result<()> {
-        let file =
-            OpenOptions::new().read(true).write(true).create(true).truncate(true).open(self.path.join(name))?;
+        let file = OpenOptions::new().read(true).write(true).create(true).truncate(true).open(self.path.join(name))?;
         drop(file);
         self.open.remove(name);
         Ok(())

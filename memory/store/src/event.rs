@@ -148,7 +148,11 @@ impl Op {
     pub fn subjects(&self) -> [Option<Id>; 2] {
         match self {
             Op::Put(object) => [Some(object.id), None],
-            Op::Move(id, ..) | Op::Region(id, _) | Op::State(id, ..) | Op::Fluent(id, ..) | Op::Confidence(id, _)
+            Op::Move(id, ..)
+            | Op::Region(id, _)
+            | Op::State(id, ..)
+            | Op::Fluent(id, ..)
+            | Op::Confidence(id, _)
             | Op::Remove(id) => [Some(*id), None],
             Op::Relate(a, _, b, _) => [Some(*a), Some(*b)],
             Op::Define(..) | Op::IsA(..) | Op::Searched(..) | Op::Clear => [None, None],

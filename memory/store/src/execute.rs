@@ -50,12 +50,15 @@ pub fn plan(state: &State, query: &Query, filters: &[Filter]) -> Plan {
         _ => None,
     });
     let spans: Option<Vec<Span>> = match (categories, query.region) {
-        (Some(all), Some(region)) => Some(all.iter().filter_map(|category| table.span(region, *category)).copied().collect()),
+        (Some(all), Some(region)) => {
+            Some(all.iter().filter_map(|category| table.span(region, *category)).copied().collect())
+        }
         (Some(all), None) => Some(all.iter().flat_map(|category| table.of_category(*category)).copied().collect()),
         (None, Some(region)) => Some(table.of_region(region).to_vec()),
         (None, None) => None,
     };
-    let rows = spans.as_ref().map_or(table.live, |spans| spans.iter().map(|span| (span.end - span.first) as usize).sum());
+    let rows =
+        spans.as_ref().map_or(table.live, |spans| spans.iter().map(|span| (span.end - span.first) as usize).sum());
     let lists = filters.iter().filter_map(|filter| match filter {
         Filter::OneOf(_, ids) => Some(ids),
         _ => None,
@@ -310,7 +313,10 @@ impl<'s> Search<'s> {
         }
     }
     fn finish(self) -> Answer {
-        let hits = self.found.iter().map(|(score, id)| Hit { id: *id, score: score.max(LEAST * 8.0).exp().max(f32::MIN_POSITIVE) });
+        let hits = self
+            .found
+            .iter()
+            .map(|(score, id)| Hit { id: *id, score: score.max(LEAST * 8.0).exp().max(f32::MIN_POSITIVE) });
         Answer { hits: hits.collect(), scored: self.scored, blocks: self.blocks }
     }
 }

@@ -128,7 +128,10 @@ fn ranked(state: &State, query: &Query, hit: &Hit) -> Ranked {
 pub fn answer_as_of(state: &State, query: &Query) -> Answer {
     let (valid, known) = query.when.unwrap_or((Nanos::MAX, Nanos::MAX));
     let categories = query.all_categories(state);
-    let rest: Vec<Filter> = Filter::of(&Query { related: query.related.clone(), numbers: query.numbers.clone(), ..Query::default() }, state);
+    let rest: Vec<Filter> = Filter::of(
+        &Query { related: query.related.clone(), numbers: query.numbers.clone(), ..Query::default() },
+        state,
+    );
     let mut answer = Answer::default();
     let mut found: Vec<(f32, Id)> = Vec::new();
     let pages = state.pages.len() as Id * block::ROWS as Id;

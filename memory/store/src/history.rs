@@ -1,6 +1,11 @@
 //! Chains of changes: what was so at one moment, as it was known at another.
 
-use crate::{Id, Nanos, cow::{Grown, Run}, event::Sure, symbols::Symbol};
+use crate::{
+    Id, Nanos,
+    cow::{Grown, Run},
+    event::Sure,
+    symbols::Symbol,
+};
 use bytemuck::{Pod, Zeroable};
 use serde::{Deserialize, Serialize};
 use std::{collections::BTreeMap, sync::Arc};
@@ -148,13 +153,19 @@ impl History {
             ASIDE => self.aside.get(&index).is_some_and(|moment| *moment <= valid),
             _ if u64::from(delta.sequence) < until => true,
             0 => false,
-            earlier => {
-                self.known(u64::from(delta.sequence)).saturating_sub(u64::from(earlier) * 1000) <= valid
-            }
+            earlier => self.known(u64::from(delta.sequence)).saturating_sub(u64::from(earlier) * 1000) <= valid,
         }
     }
     /// Adds a change and gives its place, 1 + index.
-    pub(crate) fn add(&mut self, change: (Nanos, Nanos), sequence: u32, key: Key, origin: [u8; 2], value: [u32; 3], before: u32) -> u32 {
+    pub(crate) fn add(
+        &mut self,
+        change: (Nanos, Nanos),
+        sequence: u32,
+        key: Key,
+        origin: [u8; 2],
+        value: [u32; 3],
+        before: u32,
+    ) -> u32 {
         let (valid, known) = change;
         let index = self.deltas.len() as u32;
         let earlier = known.checked_sub(valid).filter(|ns| ns % 1000 == 0).map(|ns| ns / 1000);
@@ -287,7 +298,10 @@ impl History {
     }
     /// Bytes that it takes.
     pub fn bytes(&self) -> usize {
-        self.deltas.len() * size_of::<Delta>() + self.wide.len() * 12 + self.aside.len() * 24 + self.commits.len() * size_of::<Known>()
+        self.deltas.len() * size_of::<Delta>()
+            + self.wide.len() * 12
+            + self.aside.len() * 24
+            + self.commits.len() * size_of::<Known>()
     }
 }
 

@@ -266,7 +266,8 @@ impl Log {
         let mut log = Log { first: log_first, number: first, length: 0, place: skip };
         for (index, number) in numbers.iter().enumerate() {
             let file = name(*number);
-            let damaged = |byte: usize, reason: String| LogError::Damaged { file: file.clone(), byte: byte as u64, reason };
+            let damaged =
+                |byte: usize, reason: String| LogError::Damaged { file: file.clone(), byte: byte as u64, reason };
             let last = index + 1 >= end;
             if *number != first + index as u64 {
                 return Err(damaged(0, format!("the segment before it, {}, is missing", name(first + index as u64))));
@@ -307,7 +308,10 @@ impl Log {
                     Record::Commit(end) => {
                         let right = end.batch == log.place.batch && end.events as usize == batch.len();
                         if !right {
-                            return Err(damaged(at - size, format!("batch {} is not the one that belongs here", end.batch)));
+                            return Err(damaged(
+                                at - size,
+                                format!("batch {} is not the one that belongs here", end.batch),
+                            ));
                         }
                         if end.next > skip.next {
                             marks.push((batch.len(), end.time));
@@ -392,6 +396,8 @@ fn commits(bytes: &[u8], from: usize) -> impl Iterator<Item = usize> {
     let size = ((COMMIT_BODY + 1) as u32).to_le_bytes();
     let starts = from..bytes.len().saturating_sub(HEAD + COMMIT_BODY - 1);
     starts.filter(move |&at| {
-        bytes.get(at..).is_some_and(|rest| rest.starts_with(&size) && matches!(read(rest, None), Some((Record::Commit(_), _))))
+        bytes
+            .get(at..)
+            .is_some_and(|rest| rest.starts_with(&size) && matches!(read(rest, None), Some((Record::Commit(_), _))))
     })
 }

@@ -19,7 +19,10 @@ impl Map {
         if file.metadata()?.len() == 0 {
             return Ok(Map::of_bytes(&[]));
         }
-        #[allow(unsafe_code, reason = "a mapped file is plain memory as long as nobody shortens it; ours are never written again")]
+        #[allow(
+            unsafe_code,
+            reason = "a mapped file is plain memory as long as nobody shortens it; ours are never written again"
+        )]
         // SAFETY: the mapping is private and read-only, and the file is never changed after its rename.
         let map = unsafe { memmap2::Mmap::map(file)? };
         Ok(Map(Bytes::Mapped(map)))

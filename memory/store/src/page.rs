@@ -1,6 +1,11 @@
 //! 256 ids: where each object's row is, what is seldom asked, and its parts.
 
-use crate::{Nanos, NONE, block::ROWS, cow::{Run, Stored}, event::Part};
+use crate::{
+    NONE, Nanos,
+    block::ROWS,
+    cow::{Run, Stored},
+    event::Part,
+};
 use bytemuck::{Pod, Zeroable};
 
 /// The object was put at least once.

@@ -189,7 +189,10 @@ impl Relations {
     }
     /// What an object is in one relation to.
     pub fn objects(&self, subject: Id, relation: Symbol) -> impl Iterator<Item = Id> {
-        self.forth.range((subject, relation, 0), (subject, relation, Id::MAX)).filter(Edge::holds).map(|edge| edge.object)
+        self.forth
+            .range((subject, relation, 0), (subject, relation, Id::MAX))
+            .filter(Edge::holds)
+            .map(|edge| edge.object)
     }
     /// What is in one relation to an object.
     pub fn subjects(&self, relation: Symbol, object: Id) -> impl Iterator<Item = Id> {

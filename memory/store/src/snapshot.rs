@@ -94,10 +94,16 @@ pub fn write(state: &State, batch: u64, document: &[u8]) -> Vec<u8> {
     out.slice(state.relations.forth.sorted());
     out.slice(state.relations.back.sorted());
     out.slice(state.numbers.sorted());
-    out.section(|bytes| state.history.deltas.iter().for_each(|delta| bytes.extend_from_slice(bytemuck::bytes_of(delta))));
-    out.section(|bytes| state.history.wide.iter().for_each(|value| bytes.extend_from_slice(bytemuck::cast_slice(value))));
+    out.section(|bytes| {
+        state.history.deltas.iter().for_each(|delta| bytes.extend_from_slice(bytemuck::bytes_of(delta)))
+    });
+    out.section(|bytes| {
+        state.history.wide.iter().for_each(|value| bytes.extend_from_slice(bytemuck::cast_slice(value)))
+    });
     out.slice(&aside);
-    out.section(|bytes| state.history.commits.iter().for_each(|known| bytes.extend_from_slice(bytemuck::bytes_of(known))));
+    out.section(|bytes| {
+        state.history.commits.iter().for_each(|known| bytes.extend_from_slice(bytemuck::bytes_of(known)))
+    });
     out.slice(state.space.large().points.get());
     out.slice(state.space.large().planes.get());
     out.section(|bytes| {
@@ -175,8 +181,27 @@ pub fn read(map: Arc<Map>) -> Result<Found, String> {
 }
 
 fn unpack(map: &Arc<Map>, head: &Head) -> Option<Found> {
-    let [words, hot, slots, masks, mask_ends, heads, parts, part_ends, spans, forth, back, numbers, deltas, wide, aside, commits, points, planes, rest] =
-        *head.sections.first_chunk::<19>()?;
+    let [
+        words,
+        hot,
+        slots,
+        masks,
+        mask_ends,
+        heads,
+        parts,
+        part_ends,
+        spans,
+        forth,
+        back,
+        numbers,
+        deltas,
+        wide,
+        aside,
+        commits,
+        points,
+        planes,
+        rest,
+    ] = *head.sections.first_chunk::<19>()?;
     let bytes = |section: Section| map.slice::<u8>(section.at as usize, section.length as usize);
     let mut symbols: Symbols = serde_json::from_slice(bytes(words)?).ok()?;
     symbols.reindex();

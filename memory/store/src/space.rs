@@ -87,7 +87,8 @@ impl Tree {
                 node = near;
             }
             let leaf = node - planes.len();
-            let (first, end) = (start(points.len(), leaf, planes.len() + 1), start(points.len(), leaf + 1, planes.len() + 1));
+            let (first, end) =
+                (start(points.len(), leaf, planes.len() + 1), start(points.len(), leaf + 1, planes.len() + 1));
             for point in points.get(first..end).unwrap_or_default() {
                 nearest.offer(point);
             }
@@ -95,7 +96,14 @@ impl Tree {
     }
 }
 
-fn split(points: &mut [Point], planes: &mut [Plane], node: usize, leaves: (usize, usize), all: (usize, usize), base: usize) {
+fn split(
+    points: &mut [Point],
+    planes: &mut [Plane],
+    node: usize,
+    leaves: (usize, usize),
+    all: (usize, usize),
+    base: usize,
+) {
     if leaves.1 - leaves.0 < 2 {
         return;
     }
@@ -140,7 +148,8 @@ impl<'a> Nearest<'a> {
     }
     #[inline]
     fn offer(&mut self, point: &Point) {
-        let [dx, dy, dz] = [point.position[0] - self.at[0], point.position[1] - self.at[1], point.position[2] - self.at[2]];
+        let [dx, dy, dz] =
+            [point.position[0] - self.at[0], point.position[1] - self.at[1], point.position[2] - self.at[2]];
         let distance = dx * dx + dy * dy + dz * dz;
         if distance > self.limit || !(self.accept)(point) {
             return;
@@ -218,9 +227,11 @@ impl Space {
             self.small.search(at, &mut nearest);
             self.large.search(at, &mut nearest);
             let mut found = nearest.into_found();
-            found.retain(|(id, _)| !seen.contains(id) && {
-                seen.push(*id);
-                true
+            found.retain(|(id, _)| {
+                !seen.contains(id) && {
+                    seen.push(*id);
+                    true
+                }
             });
             found.truncate(most);
             return found;

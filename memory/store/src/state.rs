@@ -62,7 +62,8 @@ impl State {
         if self.next + events.len() as u64 > u64::from(u32::MAX) - 1 {
             return Err("more than 4,294,967,294 events: begin a new memory".into());
         }
-        let mut checker = Checker { state: self, put: BTreeSet::new(), gone: BTreeSet::new(), words: Vec::new(), cleared: false };
+        let mut checker =
+            Checker { state: self, put: BTreeSet::new(), gone: BTreeSet::new(), words: Vec::new(), cleared: false };
         events.iter().try_for_each(|event| checker.event(event))
     }
 
@@ -111,7 +112,8 @@ impl State {
             for block in self.table.blocks.iter() {
                 let hot = block.hot.get();
                 let rows = crate::block::rows(hot.live);
-                points.extend(rows.map(|row| Point { position: [hot.x[row], hot.y[row], hot.z[row]], id: hot.id[row] }));
+                points
+                    .extend(rows.map(|row| Point { position: [hot.x[row], hot.y[row], hot.z[row]], id: hot.id[row] }));
             }
             space = Space::build(points);
             self.is_still = true;
@@ -200,7 +202,13 @@ impl State {
 
     /// The nearest objects that pass a test, nearest first, equally near ones in the order of their ids: ids with distances
     /// in metres.
-    pub fn nearest(&self, at: [f32; 3], most: usize, radius_m: f32, passes: Option<&dyn Fn(Id) -> bool>) -> Vec<(Id, f32)> {
+    pub fn nearest(
+        &self,
+        at: [f32; 3],
+        most: usize,
+        radius_m: f32,
+        passes: Option<&dyn Fn(Id) -> bool>,
+    ) -> Vec<(Id, f32)> {
         let still = self.is_still && self.moved.is_empty();
         let accept = |point: &Point| {
             (still || self.position(point.id) == Some(point.position)) && passes.is_none_or(|passes| passes(point.id))
@@ -230,7 +238,14 @@ impl State {
             return None;
         }
         let ordered = heads.flags[at] & DISORDERED == 0;
-        let keys = [history::POSITION, history::ROTATION, history::REGION, history::CATEGORY, history::CONFIDENCE, history::THERE];
+        let keys = [
+            history::POSITION,
+            history::ROTATION,
+            history::REGION,
+            history::CATEGORY,
+            history::CONFIDENCE,
+            history::THERE,
+        ];
         let last = heads.last[at];
         let touched = heads.touched[at];
         let never = |key: Key| touched & 1 << key == 0;
@@ -240,7 +255,8 @@ impl State {
         let now = |get: fn(&crate::block::Hot, usize) -> u32| row.map_or(0, |(block, row)| get(block.hot.get(), row));
         let [position, rotation, region, category, confidence, there] = found;
         Some(Past {
-            position: position.map_or_else(|| row.map_or([0.0; 3], |(block, row)| block.position(row)), history::position),
+            position: position
+                .map_or_else(|| row.map_or([0.0; 3], |(block, row)| block.position(row)), history::position),
             rotation: rotation.map_or(heads.rotation[at], history::position),
             region: region.map_or_else(|| now(|hot, row| hot.region[row].into()), |value| value[0]) as Symbol,
             category: category.map_or_else(|| now(|hot, row| hot.category[row].into()), |value| value[0]) as Symbol,
@@ -296,7 +312,8 @@ impl State {
             }
             Op::Confidence(id, confidence) => {
                 let weight = weight(*confidence);
-                let old = self.row(*id).and_then(|row| self.table.at(row)).map(|(block, row)| block.hot.get().weight[row]);
+                let old =
+                    self.row(*id).and_then(|row| self.table.at(row)).map(|(block, row)| block.hot.get().weight[row]);
                 let old = old.map(|weight| [weight.to_bits(), 0, 0]);
                 if self.change(*id, history::CONFIDENCE, [weight.to_bits(), 0, 0], old, context)
                     && let Some(row) = self.row(*id)
@@ -326,8 +343,8 @@ impl State {
         let bit = bit(key);
         let mut last = heads.last[at];
         let history = &mut self.history;
-        let known_before = heads.touched[at] & bit != 0
-            && (key < FIRST || history.chain(last).any(|(_, delta)| delta.key == key));
+        let known_before =
+            heads.touched[at] & bit != 0 && (key < FIRST || history.chain(last).any(|(_, delta)| delta.key == key));
         if !known_before && let Some(old) = old {
             let (born, first) = (heads.born[at], heads.first[at]);
             let known = history.known_or(u64::from(first), context.known);
@@ -594,7 +611,10 @@ struct Checker<'s> {
 
 impl Checker<'_> {
     fn event(&mut self, event: &Event) -> Result<(), String> {
-        if event.ops.len() > event::MAX_OPS || event.evidence.len() > event::MAX_EVIDENCE || event.about.len() > event::MAX_OPS {
+        if event.ops.len() > event::MAX_OPS
+            || event.evidence.len() > event::MAX_EVIDENCE
+            || event.about.len() > event::MAX_OPS
+        {
             return Err("an event has more operations or evidence than it may".into());
         }
         if !event.confidence.is_finite() {

@@ -35,7 +35,9 @@ pub enum StoreError {
     #[error("{0} is in use by another process")]
     Locked(PathBuf),
     /// The folder was written by a program with another format number.
-    #[error("the folder has format {found}, this program reads format {known}: use another folder, or the program that wrote it")]
+    #[error(
+        "the folder has format {found}, this program reads format {known}: use another folder, or the program that wrote it"
+    )]
     Format {
         /// The number found.
         found: u32,
@@ -65,7 +67,9 @@ fn io_error(what: &str) -> impl FnOnce(io::Error) -> StoreError + '_ {
 fn log_error(error: LogError) -> StoreError {
     match error {
         LogError::Io(source) => StoreError::Io { what: "the log cannot be read".into(), source },
-        LogError::Damaged { file, byte, reason } => StoreError::Damaged { file: format!("{file}, byte {byte}"), reason },
+        LogError::Damaged { file, byte, reason } => {
+            StoreError::Damaged { file: format!("{file}, byte {byte}"), reason }
+        }
     }
 }
 
@@ -95,7 +99,10 @@ pub struct Store {
 
 impl std::fmt::Debug for Store {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Store").field("next", &self.state.next).field("manifest", &self.manifest).finish_non_exhaustive()
+        f.debug_struct("Store")
+            .field("next", &self.state.next)
+            .field("manifest", &self.manifest)
+            .finish_non_exhaustive()
     }
 }
 
@@ -106,7 +113,16 @@ impl Store {
         let log = Log::empty(&mut disk);
         let published = Reader(Arc::new(RwLock::new(Arc::new(State::default()))));
         let (manifest, group) = (Manifest::default(), Batch::default());
-        Store { disk: Box::new(disk), state: State::default(), log, manifest, group, pending: None, broken: None, published }
+        Store {
+            disk: Box::new(disk),
+            state: State::default(),
+            log,
+            manifest,
+            group,
+            pending: None,
+            broken: None,
+            published,
+        }
     }
     /// Opens or makes a folder.
     pub fn open(path: &Path) -> Result<Store, StoreError> {
@@ -169,7 +185,8 @@ impl Store {
         let log = log.map_err(log_error)?;
         state.settle(false);
         let published = Reader(Arc::new(RwLock::new(Arc::new(State::default()))));
-        let store = Store { disk, state, log, manifest, group: Batch::default(), pending: None, broken: None, published };
+        let store =
+            Store { disk, state, log, manifest, group: Batch::default(), pending: None, broken: None, published };
         Ok((store, document))
     }
 
@@ -256,7 +273,9 @@ impl Store {
         let number = self.log.segment() + 1;
         let bytes = snapshot::write(&self.state, self.log.place().batch, document);
         let result = self.put_snapshot(number, &bytes);
-        result.inspect_err(|error| self.broken = Some(error.to_string())).map_err(io_error("the snapshot cannot be written"))
+        result
+            .inspect_err(|error| self.broken = Some(error.to_string()))
+            .map_err(io_error("the snapshot cannot be written"))
     }
     fn put_snapshot(&mut self, number: u64, bytes: &[u8]) -> io::Result<()> {
         let (file, fresh) = (snapshot::name(number), "snapshot.new");
@@ -298,7 +317,9 @@ impl Store {
             state.commit(*time);
         }
         let result = self.put_log(batches);
-        result.inspect_err(|error| self.broken = Some(error.to_string())).map_err(io_error("the log cannot be rewritten"))?;
+        result
+            .inspect_err(|error| self.broken = Some(error.to_string()))
+            .map_err(io_error("the log cannot be rewritten"))?;
         self.state = state;
         if Arc::strong_count(&self.published.0) > 1 {
             self.publish();

@@ -168,12 +168,20 @@ fn what_is_forgotten_is_in_no_byte_of_the_folder() {
         assert!(find(&disk.bytes(), needle));
     }
     let region = world.words.regions[1];
-    let in_region: Vec<Id> = store.state().ids().filter(|id| store.state().as_of(*id, 9, 9).unwrap().region == region).collect();
+    let in_region: Vec<Id> =
+        store.state().ids().filter(|id| store.state().as_of(*id, 9, 9).unwrap().region == region).collect();
     assert!(!in_region.is_empty());
     let place_there = store.state().position(in_region[0]).unwrap();
     let what = Forget { objects: vec![7], regions: vec![region], sources: vec![guest] };
     store.forget(&what, |_, _| None).unwrap();
-    for needle in [b"diary".as_slice(), b"the-guest", b"room-1", &place[0].to_le_bytes(), &other[1].to_le_bytes(), &place_there[0].to_le_bytes()] {
+    for needle in [
+        b"diary".as_slice(),
+        b"the-guest",
+        b"room-1",
+        &place[0].to_le_bytes(),
+        &other[1].to_le_bytes(),
+        &place_there[0].to_le_bytes(),
+    ] {
         assert!(!find(&disk.bytes(), needle), "{:?}", String::from_utf8_lossy(needle));
     }
     assert!(store.state().row(7).is_none() && store.state().row(8).is_some());
@@ -206,7 +214,8 @@ fn a_reader_of_a_hundred_lines_in_python_reads_the_same() {
     for id in store.state().ids() {
         let object = store.state().object(id).unwrap();
         let told = &found["objects"][id.to_string()];
-        let floats: Vec<f32> = told["position"].as_array().unwrap().iter().map(|v| v.as_f64().unwrap() as f32).collect();
+        let floats: Vec<f32> =
+            told["position"].as_array().unwrap().iter().map(|v| v.as_f64().unwrap() as f32).collect();
         assert_eq!(floats, object.position);
         assert_eq!(told["category"], store.state().symbols.word(object.category));
         assert_eq!(told["parts"], object.parts.len());

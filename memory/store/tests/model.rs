@@ -165,7 +165,9 @@ pub fn agree(state: &State, reference: &Naive, world: &mut World, moments: &[u64
                 };
                 let found = state.sure_as_of(id, *word, valid, known);
                 if found != wanted {
-                    return Err(format!("state {word} of {id} as of ({valid}, {known}): {found:?}, should be {wanted:?}"));
+                    return Err(format!(
+                        "state {word} of {id} as of ({valid}, {known}): {found:?}, should be {wanted:?}"
+                    ));
                 }
             }
         }
@@ -237,7 +239,9 @@ fn readers_keep_their_view_while_the_writer_goes_on() {
     let before = reader.view();
     let place = before.position(7).unwrap();
     let source = world.words.source;
-    store.commit(&[Event::new(2, source, 1.0, vec![Op::Move(7, [9.0, 9.0, 9.0], [0.0; 3]), Op::Remove(8)])], 2).unwrap();
+    store
+        .commit(&[Event::new(2, source, 1.0, vec![Op::Move(7, [9.0, 9.0, 9.0], [0.0; 3]), Op::Remove(8)])], 2)
+        .unwrap();
     assert_eq!(before.position(7), Some(place));
     assert!(before.row(8).is_some());
     let after = reader.view();

@@ -107,7 +107,10 @@ fn one(draw: &mut Draw) -> Result<(), Fault> {
     if found == sure || found == maybe {
         Ok(())
     } else {
-        Err(Fault::Lost(format!("{} events are there, which is neither what was acknowledged nor one batch more", store.state().next)))
+        Err(Fault::Lost(format!(
+            "{} events are there, which is neither what was acknowledged nor one batch more",
+            store.state().next
+        )))
     }
 }
 

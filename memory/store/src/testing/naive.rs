@@ -130,11 +130,18 @@ pub fn answer(all: &BTreeMap<Id, Then>, query: &Query) -> Vec<Hit> {
             && query.region.is_none_or(|region| object.region == region)
             && query.templates.iter().all(|word| object.parts.iter().any(|part| part.template == *word))
             && query.affordances.iter().all(affords)
-            && query.states.iter().all(|(word, yes)| if *yes { object.states.contains(word) } else { then.not.contains(word) })
-            && query.numbers.iter().all(|(word, low, high)| then.numbers.get(word).is_some_and(|v| (low..=high).contains(&v)))
+            && query
+                .states
+                .iter()
+                .all(|(word, yes)| if *yes { object.states.contains(word) } else { then.not.contains(word) })
+            && query
+                .numbers
+                .iter()
+                .all(|(word, low, high)| then.numbers.get(word).is_some_and(|v| (low..=high).contains(&v)))
             && query.geometry.iter().all(|(template, index, low, high)| {
                 object.parts.iter().any(|part| {
-                    part.template == *template && part.theta.get(usize::from(*index)).is_some_and(|v| (low..=high).contains(&v))
+                    part.template == *template
+                        && part.theta.get(usize::from(*index)).is_some_and(|v| (low..=high).contains(&v))
                 })
             })
             && query.min_confidence.is_none_or(|least| weight(object.confidence) >= weight(least))
