@@ -130,7 +130,7 @@ fn verify(dir: &Path) -> anyhow::Result<()> {
     let mut twin = State::default();
     let mut batch = Vec::new();
     let mut known = None;
-    let mut take = |twin: &mut State, batch: &mut Vec<acm_store::Event>, time: u64| -> anyhow::Result<()> {
+    let take = |twin: &mut State, batch: &mut Vec<acm_store::Event>, time: u64| -> anyhow::Result<()> {
         twin.check(batch, time).map_err(anyhow::Error::msg)?;
         batch.drain(..).for_each(|event| twin.apply(&event, time));
         twin.commit(time);

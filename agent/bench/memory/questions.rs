@@ -195,7 +195,12 @@ fn past(size: u32, world: &mut World, state: &State) -> (Vec<f64>, f64) {
     let questions: Vec<(Id, u64)> = (0..20_000)
         .map(|_| (world.draw.below(objects) as Id, begin + world.draw.below(size as usize) as u64))
         .collect();
-    (each(&questions, |(id, moment)| drop(black_box(state.as_of(*id, *moment, u64::MAX)))), bytes)
+    (
+        each(&questions, |(id, moment)| {
+            black_box(state.as_of(*id, *moment, u64::MAX));
+        }),
+        bytes,
+    )
 }
 
 /// A thing is slid along upright, or a state of it changes.
