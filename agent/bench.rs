@@ -3,6 +3,7 @@
 //! | module | holds |
 //! |---|---|
 //! | [`ablation`] | the same episodes with one language model after another |
+//! | [`memory`] | the engine under memory at a million objects, beside SQLite, redb and roaring |
 //! | [`targets`] | floors and goals, and the comparison with them |
 //! | [`bddl`] | reads household activities and tabletop tasks of the outside data |
 //! | [`perception`] | real labelled frames, and the fixed rendered suite with its truth |
@@ -14,13 +15,14 @@
 pub mod ablation;
 pub mod bddl;
 pub mod identity;
+pub mod memory;
 pub mod perception;
 pub mod planner;
 pub mod runtime;
 pub mod targets;
 pub mod world;
 
-use crate::cli::{AblationArgs, BenchArgs, BenchCommand, Exit, PerceptionArgs, PlannerArgs, WorldArgs};
+use crate::cli::{AblationArgs, BenchArgs, BenchCommand, Exit, MemoryArgs, PerceptionArgs, PlannerArgs, WorldArgs};
 use anyhow::Context;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
@@ -152,6 +154,7 @@ pub fn run(command: &BenchCommand) -> anyhow::Result<Exit> {
     | BenchCommand::Perception(PerceptionArgs { common: args, .. })
     | BenchCommand::Identity(args)
     | BenchCommand::Planner(PlannerArgs { common: args, .. })
+    | BenchCommand::Memory(MemoryArgs { common: args, .. })
     | BenchCommand::Runtime(args)
     | BenchCommand::World(WorldArgs { common: args, .. })) = command;
     // First, so that a mistake in the file does not cost the measurement.
@@ -164,6 +167,7 @@ pub fn run(command: &BenchCommand) -> anyhow::Result<Exit> {
         BenchCommand::Perception(args) => perception::measure(args, &targets),
         BenchCommand::Identity(args) => identity::measure(args),
         BenchCommand::Planner(args) => planner::measure(args),
+        BenchCommand::Memory(args) => memory::measure(args),
         BenchCommand::Runtime(args) => runtime::measure(args),
         BenchCommand::World(args) => world::measure(args),
     };

@@ -2,6 +2,7 @@
 
 #[cfg(feature = "learned")]
 pub mod learn;
+pub mod memory;
 pub mod trace;
 
 use crate::{
@@ -84,6 +85,9 @@ pub enum Command {
     /// Run the simulator in a process of its own.
     #[command(subcommand)]
     Sim(SimCommand),
+    /// Ask, check, export and forget what a memory folder holds.
+    #[command(subcommand)]
+    Memory(memory::MemoryCommand),
     /// Look into the traces that `acm run --trace` writes.
     #[command(subcommand)]
     Trace(trace::TraceCommand),
@@ -466,6 +470,8 @@ pub enum BenchCommand {
     Identity(BenchArgs),
     /// Goals of published tasks (found through the variable ACM_DATA): solved or not, each plan simulated.
     Planner(PlannerArgs),
+    /// The engine under memory at 1e4, 1e5 and 1e6 objects: questions, commits, recovery, power failures, forgetting.
+    Memory(MemoryArgs),
     /// Frames between processes, messages between actors, what a trace costs, how fast an actor is replaced.
     Runtime(BenchArgs),
     /// Physics beside MuJoCo, grasps, primitives, rendering, pace, physics audit, snapshots.
@@ -519,6 +525,17 @@ pub struct AblationArgs {
     /// Leave out the model that errs.
     #[arg(long)]
     pub no_degradation: bool,
+}
+
+/// Arguments of `acm bench memory`.
+#[derive(Debug, Args)]
+pub struct MemoryArgs {
+    /// What every bench takes.
+    #[command(flatten)]
+    pub common: BenchArgs,
+    /// Draw cost against the number of objects into this file.
+    #[arg(long, value_name = "FILE.svg")]
+    pub plot: Option<PathBuf>,
 }
 
 /// Arguments of `acm bench perception`.
@@ -578,6 +595,7 @@ pub fn run(cli: Cli) -> anyhow::Result<Exit> {
         Command::Scenario(command) => scenario::run(&command),
         Command::Library(args) => library::run(&args),
         Command::Sim(SimCommand::Serve(args)) => serve::run(&args),
+        Command::Memory(command) => crate::memory::run(&command),
         Command::Trace(command) => crate::trace::run(&command),
         Command::Bench(command) => bench::run(&command),
         #[cfg(feature = "learned")]

@@ -10,6 +10,7 @@
 //! | [`serve`] | `acm sim serve`: the simulator as such a robot |
 //! | [`inject`] | faults that can be put between the agent and its world |
 //! | [`llm`] | which language model reads instructions, if any |
+//! | [`memory`] | `acm memory`: asks, checks, exports and forgets what a memory folder holds |
 //! | [`narrate`] | the story of an episode, told from its messages |
 //! | [`live`] | how a run goes on, while it does |
 //! | [`demo`] | `acm demo`: the first minute |
@@ -37,6 +38,7 @@ pub mod learn;
 pub mod library;
 pub mod live;
 pub mod llm;
+pub mod memory;
 pub mod narrate;
 pub mod perceive;
 pub mod remote;

@@ -5,7 +5,7 @@ use crate::{
     event::{Change, Counters, Event, Forget, Source},
     execute, expect,
     identity::IdentityRule,
-    log::Log,
+    ledger::Ledger,
     observation::{Executed, Grounding, Note, Observation, Verdict},
     observe,
     recent::{Recent, RecentEvents},
@@ -13,11 +13,13 @@ use crate::{
     traits::{Memory, MemoryError, MemoryView},
     view::Snapshot,
 };
-use acm_concept::{expectation::Expectation, ids::TransitionId, template::TemplateLibrary, time::Time};
-use std::{
-    path::{Path, PathBuf},
-    sync::Arc,
+use acm_concept::{
+    expectation::Expectation,
+    ids::{ObjectId, TransitionId},
+    template::TemplateLibrary,
+    time::Time,
 };
+use std::{path::Path, sync::Arc};
 
 /// Analytic concept-centric memory: object, scene, transition and skill memory over a library of templates.
 ///
@@ -33,33 +35,26 @@ pub struct AcmMemory {
     library: Arc<TemplateLibrary>,
     rule: IdentityRule,
     state: State,
-    log: Option<Log>,
+    ledger: Ledger,
     recent: RecentEvents,
 }
 
 impl AcmMemory {
     /// A memory that ends with the process.
     pub fn in_memory(library: Arc<TemplateLibrary>) -> AcmMemory {
-        AcmMemory {
-            library,
-            rule: IdentityRule::Global,
-            state: State::default(),
-            log: None,
-            recent: RecentEvents::default(),
-        }
+        let (rule, recent) = (IdentityRule::Global, RecentEvents::default());
+        AcmMemory { library, rule, state: State::default(), ledger: Ledger::in_memory(), recent }
     }
     /// Creates a memory folder or continues the one that is there. What a crash left unacknowledged is cut off.
     pub fn open(dir: &Path, library: Arc<TemplateLibrary>) -> Result<AcmMemory, MemoryError> {
-        let (log, events) = Log::open(dir)?;
-        let mut state = State::default();
-        for (number, event) in (0u64..).zip(&events) {
-            state.apply(event).map_err(|reason| MemoryError::Record {
-                path: log.path().into(),
-                record: number,
-                reason,
-            })?;
-        }
-        Ok(AcmMemory { library, rule: IdentityRule::Global, state, log: Some(log), recent: RecentEvents::default() })
+        let (ledger, events) = Ledger::open(dir)?;
+        let state = fold(&events).map_err(|(record, reason)| MemoryError::Record {
+            path: ledger.path().into(),
+            record,
+            reason,
+        })?;
+        let (rule, recent) = (IdentityRule::Global, RecentEvents::default());
+        Ok(AcmMemory { library, rule, state, ledger, recent })
     }
     /// The same memory with another identity rule.
     pub fn with_identity(self, rule: IdentityRule) -> AcmMemory {
@@ -72,9 +67,32 @@ impl AcmMemory {
         let (state, events, fault) = (draft.state, draft.events, draft.fault);
         self.commit(state, events, fault)
     }
+    /// Forgets objects and what was done to them so that no byte of them stays in the folder. What skills learned from
+    /// them stays, as numbers without a link; so do words of the instruction.
+    pub fn erase(&mut self, objects: &[ObjectId]) -> Result<(), MemoryError> {
+        let kept = self.ledger.forget(&objects.iter().copied().collect())?;
+        let next = self.state.next;
+        self.state = fold(&kept).map_err(|(record, reason)| MemoryError::Record {
+            path: self.ledger.path().into(),
+            record,
+            reason,
+        })?;
+        // An id is never given twice.
+        self.state.next = Counters { episode: self.state.next.episode, ..next };
+        self.recent = RecentEvents::default();
+        Ok(())
+    }
+    /// Writes the engine's columns beside the log, for whoever asks them alone.
+    pub fn write_snapshot(&mut self) -> Result<(), MemoryError> {
+        self.ledger.snapshot()
+    }
+    /// The engine's columns as of the last call: folded from the same log as what is believed.
+    pub fn columns(&self) -> &Arc<acm_store::State> {
+        self.ledger.columns()
+    }
     /// The present view, with what only this memory can be asked.
     pub fn snapshot(&self) -> Snapshot {
-        Snapshot::new(self.state.clone(), self.library.clone())
+        Snapshot::new(self.state.clone(), self.library.clone(), self.ledger.columns().clone())
     }
     /// Objects that the last frame showed, and those in the hand.
     pub fn present_in_last_frame(&self) -> Vec<acm_concept::ids::ObjectId> {
@@ -98,9 +116,7 @@ impl AcmMemory {
     /// Writes a batch to the log, then takes over the state that it leads to.
     fn commit(&mut self, state: State, events: Vec<Event>, fault: Option<String>) -> Result<(), MemoryError> {
         self.check(&events, fault)?;
-        if let Some(log) = &mut self.log {
-            log.append(&events)?;
-        }
+        self.ledger.append(&events)?;
         self.state = state;
         self.recent.add(events);
         Ok(())
@@ -111,9 +127,7 @@ impl AcmMemory {
         let mut state = State::default();
         let fault = events.iter().try_for_each(|event| state.apply(event)).err();
         self.check(&events, fault)?;
-        if let Some(log) = &mut self.log {
-            log.replace(&events)?;
-        }
+        self.ledger.replace(&events)?;
         self.state = state;
         self.recent.add(events);
         Ok(())
@@ -121,10 +135,7 @@ impl AcmMemory {
 
     /// Refuses a batch that could not be read back: it would make the whole log unreadable.
     fn check(&self, events: &[Event], fault: Option<String>) -> Result<(), MemoryError> {
-        let refuse = |reason| {
-            let path = self.log.as_ref().map_or_else(|| PathBuf::from("(in memory)"), |log| log.path().into());
-            Err(MemoryError::Record { path, record: 0, reason })
-        };
+        let refuse = |reason| Err(MemoryError::Record { path: self.ledger.path().into(), record: 0, reason });
         if let Some(reason) = fault {
             return refuse(reason);
         }
@@ -145,6 +156,15 @@ impl AcmMemory {
         }
         Ok(())
     }
+}
+
+/// The state that events add up to, or the number of the one that has no meaning, and why.
+fn fold(events: &[Event]) -> Result<State, (u64, String)> {
+    let mut state = State::default();
+    for (number, event) in (0u64..).zip(events) {
+        state.apply(event).map_err(|reason| (number, reason))?;
+    }
+    Ok(state)
 }
 
 impl Memory for AcmMemory {

@@ -59,7 +59,7 @@ pub enum MemoryError {
         path: PathBuf,
     },
     /// A folder that holds no memory.
-    #[error("{path} holds no memory: it has no events.log")]
+    #[error("{path} holds no memory: it has no file FORMAT")]
     Missing {
         /// The folder.
         path: PathBuf,

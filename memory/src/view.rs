@@ -21,11 +21,16 @@ use std::sync::Arc;
 pub struct Snapshot {
     state: State,
     library: Arc<TemplateLibrary>,
+    columns: Arc<acm_store::State>,
 }
 
 impl Snapshot {
-    pub(crate) fn new(state: State, library: Arc<TemplateLibrary>) -> Snapshot {
-        Snapshot { state, library }
+    pub(crate) fn new(state: State, library: Arc<TemplateLibrary>, columns: Arc<acm_store::State>) -> Snapshot {
+        Snapshot { state, library, columns }
+    }
+    /// The engine's columns, folded from the same events: typed queries, nearest things, the past, what-if forks.
+    pub fn columns(&self) -> &acm_store::State {
+        &self.columns
     }
     /// Free places on which an object could have stood: tops of the most common kind of supportive thing, with
     /// equal probabilities. What a guess may choose from where nothing is known.

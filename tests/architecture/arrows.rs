@@ -6,11 +6,12 @@ use cargo_metadata::{DependencyKind, Metadata};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Each of our crates with those of ours that it may name. A crate that is missing here may not exist.
-const MAY_NAME: [(&str, &[&str]); 14] = [
+const MAY_NAME: [(&str, &[&str]); 15] = [
     ("acm-concept", &[]),
     ("acm-llm", &[]),
     ("acm-runtime", &[]),
-    ("acm-memory", &["acm-concept"]),
+    ("acm-store", &[]),
+    ("acm-memory", &["acm-concept", "acm-store"]),
     ("acm-perception", &["acm-concept"]),
     ("acm-learned", &["acm-concept", "acm-perception"]),
     ("acm-onnx", &["acm-concept", "acm-perception"]),
@@ -39,6 +40,7 @@ const MAY_NAME: [(&str, &[&str]); 14] = [
             "acm-runtime",
             "acm-sim",
             "acm-skills",
+            "acm-store",
         ],
     ),
 ];
@@ -53,7 +55,7 @@ const RESERVED: [(&str, &str); 5] = [
 ];
 
 /// The agent's side: it sees frames and what an arm reports, and cannot name a simulator type.
-const AGENT_SIDE: [&str; 11] = [
+const AGENT_SIDE: [&str; 12] = [
     "acm-actors",
     "acm-baselines",
     "acm-concept",
@@ -65,6 +67,7 @@ const AGENT_SIDE: [&str; 11] = [
     "acm-planner",
     "acm-runtime",
     "acm-skills",
+    "acm-store",
 ];
 
 /// What the agent's side may not reach, over any number of steps.

@@ -50,7 +50,7 @@ impl Hunter {
         if hunt.left != 0 || hunt.victim == 0 {
             return;
         }
-        hunt.acknowledged = Some(std::fs::read(hunt.memory.join("events.log")).unwrap_or_default());
+        hunt.acknowledged = Some(std::fs::read(hunt.memory.join("log-00000000")).unwrap_or_default());
         if hunt.grace.is_zero() {
             signal(hunt.victim, "KILL");
             hunt.killed = Some(now());

@@ -186,7 +186,7 @@ fn kill_agents(seed: u64, rounds: u32) {
         let (Some(killed), Some(acknowledged)) = (hunt.killed, &hunt.acknowledged) else { continue };
         hit += 1;
         assert!(host.left().unwrap().saturating_duration_since(killed) < LIMIT, "{case}");
-        let log = std::fs::read(memory.join("events.log")).unwrap();
+        let log = std::fs::read(memory.join("log-00000000")).unwrap();
         assert!(!acknowledged.is_empty() && log.starts_with(acknowledged), "{case}");
     }
     assert!(hit >= rounds / 2, "only {hit} of {rounds} agents were still alive at their moment");

@@ -4,7 +4,7 @@ use super::*;
 use crate::{
     MemoryError,
     entry::Presence,
-    log::FORMAT,
+    ledger::FORMAT,
     memory::AcmMemory,
     observation::Note,
     staging::{Thing, begin, gripping_hand, look, open_hand, report, verify},
@@ -12,6 +12,14 @@ use crate::{
 use acm_concept::{object::Visibility, skill::FailureCause, time::Time};
 use proptest::prelude::*;
 use std::{fs, path::Path};
+
+/// The log's last segment.
+fn log_of(dir: &Path) -> std::path::PathBuf {
+    let names = fs::read_dir(dir).unwrap().map(|entry| entry.unwrap().path());
+    names.filter(|path| path.file_name().unwrap().to_string_lossy().starts_with("log-")).max().unwrap()
+}
+/// Bytes of a segment's head, and of the blocks on which batches begin.
+const BLOCK: u64 = 512;
 
 fn open(dir: &Path) -> Result<AcmMemory, MemoryError> {
     AcmMemory::open(dir, Arc::clone(&LIBRARY))
@@ -92,14 +100,13 @@ fn perform(memory: &mut AcmMemory, number: usize, step: &Step) -> Result<(), Mem
 /// The log's bytes after each acknowledged call, with the state then.
 fn states(dir: &Path, steps: &[Step]) -> Vec<(u64, crate::state::State)> {
     let mut memory = open(dir).unwrap();
-    let log = dir.join("events.log");
-    let mut states = vec![(0, memory.state().clone())];
+    let mut states = vec![(BLOCK, memory.state().clone())];
     for (number, step) in steps.iter().enumerate() {
         perform(&mut memory, number, step).unwrap();
         if matches!(step, Step::Wipe) {
             states.clear();
         }
-        states.push((fs::metadata(&log).unwrap().len(), memory.state().clone()));
+        states.push((fs::metadata(log_of(dir)).unwrap().len(), memory.state().clone()));
     }
     states
 }
@@ -118,18 +125,21 @@ proptest! {
     fn a_cut_anywhere_loses_only_what_was_not_acknowledged(steps in steps(16), place in any::<prop::sample::Index>()) {
         let dir = tempfile::tempdir().unwrap();
         let states = states(dir.path(), &steps);
-        check_cut(dir.path(), &states, place.index(states.last().unwrap().0 as usize + 1) as u64);
+        check_cut(dir.path(), &states, BLOCK + place.index((states.last().unwrap().0 - BLOCK) as usize + 1) as u64);
     }
 }
 
 fn check_cut(dir: &Path, states: &[(u64, crate::state::State)], cut: u64) {
-    let log = dir.join("events.log");
+    let log = log_of(dir);
     let whole = fs::read(&log).unwrap();
     fs::write(&log, &whole[..cut as usize]).unwrap();
     let reopened = open(dir).unwrap();
     // A wiped log begins with the wipe; cut before its end it is empty, as nothing is acknowledged in it.
-    let empty = (0, crate::state::State::default());
+    let empty = (BLOCK, crate::state::State::default());
     let (end, expected) = states.iter().rev().find(|(end, _)| *end <= cut).unwrap_or(&empty);
+    // A commit that lost but the zeros behind it is whole.
+    let padded = states.iter().find(|(end, _)| *end > cut && end - cut < BLOCK).filter(|(_, s)| reopened.state() == s);
+    let (end, expected) = padded.map_or((end, expected), |(end, state)| (end, state));
     assert_eq!(reopened.state(), expected, "cut at {cut}");
     assert_eq!(fs::metadata(&log).unwrap().len(), *end, "the torn tail is gone");
     drop(reopened);
@@ -163,7 +173,7 @@ fn writing_goes_on_after_a_repair() {
     let mut memory = open(dir.path()).unwrap();
     begin(&mut memory).unwrap();
     drop(memory);
-    let log = dir.path().join("events.log");
+    let log = log_of(dir.path());
     let mut bytes = fs::read(&log).unwrap();
     bytes.extend([7u8; 100]);
     fs::write(&log, bytes).unwrap();
@@ -178,7 +188,7 @@ fn writing_goes_on_after_a_repair() {
 fn damage_to_what_was_acknowledged_is_an_error_and_leaves_the_file_alone() {
     let dir = tempfile::tempdir().unwrap();
     let states = states(dir.path(), &[Step::Begin, Step::Note(0), Step::Note(1)]);
-    let log = dir.path().join("events.log");
+    let log = log_of(dir.path());
     let whole = fs::read(&log).unwrap();
     for at in [3, 20, states[1].0 as usize + 12, states[2].0 as usize + 40] {
         let mut damaged = whole.clone();
@@ -196,9 +206,9 @@ fn blocks_that_a_power_failure_kept_from_the_disk_are_a_torn_tail() {
     let dir = tempfile::tempdir().unwrap();
     let look = Step::Look { x: 0.0, y: 0.0, length: 0.05, confidence: 0.9, gone: false };
     let states = states(dir.path(), &[Step::Begin, look]);
-    let log = dir.path().join("events.log");
+    let log = log_of(dir.path());
     let mut bytes = fs::read(&log).unwrap();
-    let begin = (states[1].0 as usize).next_multiple_of(512);
+    let begin = states[1].0 as usize;
     bytes[begin..begin + 512].fill(0);
     fs::write(&log, bytes).unwrap();
     assert_eq!(open(dir.path()).unwrap().state(), &states[1].1);
@@ -289,4 +299,82 @@ fn a_report_that_cannot_be_read_back_is_refused_and_changes_nothing() {
 fn settling_what_was_never_recorded_is_an_error() {
     let mut memory = memory();
     assert!(matches!(verify(&mut memory, acm_concept::ids::TransitionId(3)), Err(MemoryError::UnknownTransition(_))));
+}
+
+#[test]
+fn what_was_erased_is_in_no_file_and_what_is_left_is_as_if_it_had_never_been() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut memory = open(dir.path()).unwrap();
+    begin(&mut memory).unwrap();
+    let things = [Thing::can(0.03, 0.1).at(0.0, 0.0, 0.0), Thing::block([0.05, 0.04, 0.03]).at(0.3, 0.2, 0.0)];
+    look(&mut memory, 0, 0.0, &things, &[], &open_hand(0.0)).unwrap();
+    look(&mut memory, 1, 1.0, &things, &[], &open_hand(1.0)).unwrap();
+    let view = memory.view();
+    let can = view.objects().iter().find(|entry| entry.parts[0].template == "cylinder").unwrap().id;
+    let executed = report(&*view, "pick", can, 2.0).unwrap();
+    memory.record(&executed.failing(FailureCause::Grasp, "slipped")).unwrap();
+    memory.write_snapshot().unwrap();
+    let token = format!("\"{can}\"");
+    assert!(contains(dir.path(), token.as_bytes()));
+    memory.erase(&[can]).unwrap();
+    assert!(memory.view().object(can).is_none() && memory.view().objects().len() == 1);
+    assert!(memory.view().transitions().is_empty());
+    assert!(!contains(dir.path(), token.as_bytes()) && !contains(dir.path(), b"slipped"));
+    assert_eq!(memory.columns().ids().count(), 1);
+    let objects = memory.state().objects.clone();
+    drop(memory);
+    assert_eq!(open(dir.path()).unwrap().state().objects, objects);
+}
+
+#[test]
+fn the_engines_columns_hold_what_is_believed() {
+    let dir = tempfile::tempdir().unwrap();
+    let look = |x, gone| Step::Look { x, y: 0.1, length: 0.05, confidence: 0.9, gone };
+    let steps = [
+        Step::Begin,
+        look(0.0, false),
+        look(0.0, false),
+        Step::Pick { fails: false },
+        Step::Place { x: 0.2 },
+        look(0.2, false),
+        Step::Begin,
+        look(0.2, true),
+    ];
+    let mut memory = open(dir.path()).unwrap();
+    for (number, step) in steps.iter().enumerate() {
+        perform(&mut memory, number, step).unwrap();
+        check_columns(&memory);
+    }
+    drop(memory);
+    check_columns(&open(dir.path()).unwrap());
+}
+
+/// Presence, place, support, confidence, parts and states are the same in the columns and in the state.
+fn check_columns(memory: &AcmMemory) {
+    use acm_store::{Kind, event::Sure};
+    let (columns, view) = (memory.columns(), memory.view());
+    assert_eq!(
+        columns.ids().map(u64::from).collect::<Vec<_>>(),
+        view.objects().iter().map(|o| o.id.0).collect::<Vec<_>>()
+    );
+    for entry in view.objects() {
+        let id = crate::narrow(entry.id).unwrap();
+        let object = columns.object(id).unwrap();
+        assert_eq!(columns.symbols.word(object.category), entry.category);
+        assert_eq!(object.position, entry.pose().unwrap().translation.as_vec3().to_array());
+        assert!((f64::from(object.confidence) - entry.confidence).abs() < 1e-3);
+        assert_eq!(object.parts.len(), entry.parts.len());
+        for (word, presence) in
+            [("present", Presence::Present), ("held", Presence::Held), ("missing", Presence::Missing)]
+        {
+            let state = columns.symbols.find(Kind::State, word).unwrap();
+            assert_eq!(columns.sure(id, state) == Sure::Yes, entry.presence == presence, "{id} {word}");
+        }
+        let on = columns.symbols.find(Kind::Relation, "on").unwrap();
+        let supports: Vec<u64> = columns.relations.objects(id, on).map(u64::from).collect();
+        assert_eq!(supports, entry.support.iter().map(|id| id.0).collect::<Vec<_>>());
+        // What the past of the columns says of the present is the present.
+        let past = columns.as_of(id, u64::MAX, u64::MAX).unwrap();
+        assert_eq!((past.position, past.there), (object.position, true));
+    }
 }

@@ -1,0 +1,169 @@
+//! `acm memory`: asks, checks, exports and forgets what a memory folder holds.
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`ask`] | words of the command line as a query; hits and explanations as text |
+//! | [`past`] | histories, and everything as of a moment |
+//! | [`export`] | JSON lines, SQL, PDDL, spark_dsg |
+//! | [`picture`] | the scene graph as SVG |
+
+pub mod ask;
+pub mod export;
+pub mod past;
+pub mod picture;
+
+use crate::cli::{
+    Exit,
+    memory::{ForgetArgs, MemoryCommand},
+};
+use acm_concept::ids::ObjectId;
+use acm_memory::{AcmMemory, default_library, narrow, open_store};
+use acm_store::{Id, Kind, Op, State, event::Sure};
+use anyhow::Context;
+use serde_json::json;
+use std::{collections::BTreeSet, path::Path, sync::Arc};
+
+/// Runs `acm memory`.
+pub fn run(command: &MemoryCommand) -> anyhow::Result<Exit> {
+    match command {
+        MemoryCommand::Stats { dir, json } => stats(dir, *json)?,
+        MemoryCommand::Query(args) => ask::query(args)?,
+        MemoryCommand::Explain(args) => ask::explain(args)?,
+        MemoryCommand::History { dir, object, json } => past::history(dir, object, *json)?,
+        MemoryCommand::At(args) => past::at(args)?,
+        MemoryCommand::Forget(args) => forget(args)?,
+        MemoryCommand::Verify { dir } => verify(dir)?,
+        MemoryCommand::Export { dir, format, out } => export::run(dir, *format, out)?,
+    }
+    Ok(Exit::Success)
+}
+
+/// An object's id from its readable form.
+fn object(text: &str) -> anyhow::Result<Id> {
+    let id: ObjectId = text.parse()?;
+    narrow(id).with_context(|| format!("{id} is larger than any id that is given"))
+}
+
+fn stats(dir: &Path, as_json: bool) -> anyhow::Result<()> {
+    let mut store = open_store(dir)?;
+    let disk = store.disk_bytes()?;
+    let state = store.view();
+    let bytes = state.bytes();
+    let words: serde_json::Map<String, serde_json::Value> =
+        Kind::ALL.into_iter().map(|kind| (kind.word().into(), state.symbols.of_kind(kind).count().into())).collect();
+    let told = json!({
+        "schema": "acm.memory-stats/2", "objects": state.table.live, "events": state.next,
+        "changes": state.history.deltas.len(), "relations": state.relations.forth.iter().count(),
+        "words": words, "bytes": {"disk": disk, "hot": bytes.hot, "parts": bytes.parts, "history": bytes.history},
+    });
+    if as_json {
+        println!("{told}");
+        return Ok(());
+    }
+    println!(
+        "{} objects from {} events; {} changes, {} relations",
+        told["objects"], told["events"], told["changes"], told["relations"]
+    );
+    println!(
+        "{disk} bytes on disk; in memory {} hot, {} of parts, {} of history",
+        bytes.hot, bytes.parts, bytes.history
+    );
+    for id in state.ids() {
+        println!("  {}", line(&state, id));
+    }
+    Ok(())
+}
+
+/// One object in a line.
+pub(crate) fn line(state: &State, id: Id) -> String {
+    let Some(object) = state.object(id) else { return format!("O{id} is not there") };
+    let [x, y, z] = object.position;
+    let word = |symbol| state.symbols.word(symbol);
+    let states: Vec<&str> = object.states.iter().map(|state| word(*state)).collect();
+    let related = state.relations.of(id).filter(acm_store::relation::Edge::holds);
+    let related: Vec<String> = related.map(|edge| format!("{} O{}", word(edge.relation), edge.object)).collect();
+    let place = if object.region == 0 { String::new() } else { format!(" in {}", word(object.region)) };
+    let states = [states.join(" "), related.join(" ")].join(" ");
+    format!(
+        "O{id:<5} {:<16} ({x:.3}, {y:.3}, {z:.3}){place} {:.2} {}",
+        word(object.category),
+        object.confidence,
+        states.trim()
+    )
+}
+
+fn forget(args: &ForgetArgs) -> anyhow::Result<()> {
+    let mut store = open_store(&args.dir)?;
+    let find = |state: &State, kind: Kind, words: &[String]| -> anyhow::Result<Vec<u16>> {
+        words.iter().map(|word| ask::word(state, kind, word)).collect()
+    };
+    let (regions, sources) =
+        (find(store.state(), Kind::Region, &args.region)?, find(store.state(), Kind::Source, &args.source)?);
+    let mut gone: BTreeSet<Id> = args.object.iter().map(|text| object(text)).collect::<anyhow::Result<_>>()?;
+    if gone.is_empty() && regions.is_empty() && sources.is_empty() {
+        anyhow::bail!("nothing is named that should be forgotten: use --object, --region or --source");
+    }
+    // A memory's beliefs are whole objects: one of which a source spoke goes with all that is known of it.
+    for (_, event) in store.events()? {
+        let named = event.source > 0 && sources.contains(&event.source);
+        let placed = event.ops.iter().any(|op| match op {
+            Op::Put(object) => regions.contains(&object.region),
+            Op::Region(_, region) => regions.contains(region),
+            _ => false,
+        });
+        if named || placed {
+            gone.extend(event.ops.iter().flat_map(Op::subjects).flatten());
+        }
+    }
+    drop(store);
+    let mut memory = AcmMemory::open(&args.dir, Arc::new(default_library()?))?;
+    let objects: Vec<ObjectId> = gone.iter().map(|id| ObjectId(u64::from(*id))).collect();
+    memory.erase(&objects)?;
+    let names: Vec<String> = objects.iter().map(ToString::to_string).collect();
+    println!("forgotten: {}", if names.is_empty() { "nothing was there".into() } else { names.join(" ") });
+    Ok(())
+}
+
+fn verify(dir: &Path) -> anyhow::Result<()> {
+    let mut store = open_store(dir)?;
+    let events = store.events()?;
+    let mut twin = State::default();
+    let mut batch = Vec::new();
+    let mut known = None;
+    let take = |twin: &mut State, batch: &mut Vec<acm_store::Event>, time: u64| -> anyhow::Result<()> {
+        twin.check(batch, time).map_err(anyhow::Error::msg)?;
+        batch.drain(..).for_each(|event| twin.apply(&event, time));
+        twin.commit(time);
+        Ok(())
+    };
+    for (time, event) in events {
+        if let Some(known) = known.filter(|known| *known != time) {
+            take(&mut twin, &mut batch, known)?;
+        }
+        known = Some(time);
+        batch.push(event);
+    }
+    if let Some(known) = known {
+        take(&mut twin, &mut batch, known)?;
+    }
+    let state = store.state();
+    let same = state.ids().eq(twin.ids()) && state.ids().all(|id| same_object(state, &twin, id));
+    if !same || state.next != twin.next {
+        anyhow::bail!(
+            "{}: the columns are not what the log adds up to; remove the snapshot and its line in FORMAT",
+            dir.display()
+        );
+    }
+    println!(
+        "{} events, {} objects: every checksum is right and the columns are what the log adds up to",
+        state.next, state.table.live
+    );
+    Ok(())
+}
+
+fn same_object(a: &State, b: &State, id: Id) -> bool {
+    let sures = |state: &State| -> Vec<Sure> {
+        state.symbols.of_kind(Kind::State).map(|(symbol, _)| state.sure(id, symbol)).collect()
+    };
+    a.object(id) == b.object(id) && sures(a) == sures(b)
+}

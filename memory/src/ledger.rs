@@ -1,0 +1,160 @@
+//! The agent's events in the engine's log. One public call on memory is one batch: its events, each with the operations
+//! that the engine's columns follow and the event itself as a document, on disk before the call returns. What is believed
+//! and what the columns hold are folded from that one log.
+
+use crate::{
+    event::Event,
+    project::{Projector, moment_ns},
+    redact::{self, Dropped},
+    traits::MemoryError,
+};
+use acm_concept::ids::ObjectId;
+use acm_store::{Store, StoreError, manifest};
+use std::{
+    collections::BTreeSet,
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+/// The format that this program reads and writes.
+pub const FORMAT: u32 = manifest::FORMAT;
+
+/// An open log with the columns that follow from it.
+#[derive(Debug)]
+pub(crate) struct Ledger {
+    path: PathBuf,
+    store: Store,
+    projector: Projector,
+    view: Arc<acm_store::State>,
+    /// Whether events are kept as documents: only where they shall be read again.
+    documents: bool,
+}
+
+impl Ledger {
+    /// Columns that end with the process.
+    pub(crate) fn in_memory() -> Ledger {
+        let path = PathBuf::from("(in memory)");
+        Ledger { path, store: Store::in_memory(), projector: Projector, view: Arc::default(), documents: false }
+    }
+    /// Opens or makes a folder and gives its events.
+    pub(crate) fn open(dir: &Path) -> Result<(Ledger, Vec<Event>), MemoryError> {
+        let path = dir.to_path_buf();
+        let mut events = Vec::new();
+        let opened = Store::open_with(dir, |number, _, event| {
+            events.extend(parse(number, event)?);
+            Ok(())
+        });
+        let (mut store, snapshot) = opened.map_err(|error| translate(&path, error))?;
+        if snapshot.is_some() {
+            // The columns came from a snapshot; what is believed comes from the log.
+            events = all_events(&path, &mut store)?;
+        }
+        let view = store.view();
+        Ok((Ledger { path, store, projector: Projector, view, documents: true }, events))
+    }
+    /// Where the log is.
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+    /// The columns as of the last batch.
+    pub(crate) fn columns(&self) -> &Arc<acm_store::State> {
+        &self.view
+    }
+    /// Writes a batch and returns once it is on disk. A batch that is refused leaves nothing behind.
+    pub(crate) fn append(&mut self, events: &[Event]) -> Result<(), MemoryError> {
+        let mut scratch = self.store.state().clone();
+        let (batch, time) = self.projector.batch(&mut scratch, events, self.documents).map_err(|r| self.record(r))?;
+        drop(scratch);
+        self.store.commit(&batch, time).map_err(|error| translate(&self.path, error))?;
+        self.view = self.store.view();
+        Ok(())
+    }
+    /// Puts a new log with one batch in the old one's place, so that nothing of the old one is left.
+    pub(crate) fn replace(&mut self, events: &[Event]) -> Result<(), MemoryError> {
+        let mut scratch = acm_store::State::default();
+        let (batch, time) = self.projector.batch(&mut scratch, events, self.documents).map_err(|r| self.record(r))?;
+        self.store.rewrite(&[(time, batch)]).map_err(|error| translate(&self.path, error))?;
+        self.view = self.store.view();
+        Ok(())
+    }
+    /// Writes the log anew without some objects and what was done to them; gives the events that are left.
+    pub(crate) fn forget(&mut self, gone: &BTreeSet<ObjectId>) -> Result<Vec<Event>, MemoryError> {
+        let mut dropped = Dropped::new(gone);
+        let kept: Vec<Event> = all_events(&self.path, &mut self.store)?
+            .into_iter()
+            .filter_map(|e| redact::event(e, &mut dropped))
+            .collect();
+        self.replace(&kept)?;
+        Ok(kept)
+    }
+    /// Writes the columns beside the log, so that whoever asks them alone opens them at once.
+    pub(crate) fn snapshot(&mut self) -> Result<(), MemoryError> {
+        self.store.snapshot(&[]).map_err(|error| translate(&self.path, error))?;
+        self.view = self.store.view();
+        Ok(())
+    }
+    fn record(&self, reason: String) -> MemoryError {
+        MemoryError::Record { path: self.path.clone(), record: self.store.state().next, reason }
+    }
+}
+
+fn parse(number: u64, event: &acm_store::Event) -> Result<Option<Event>, String> {
+    if event.document.is_empty() {
+        return Ok(None);
+    }
+    let parsed = serde_json::from_slice(&event.document);
+    parsed.map(Some).map_err(|error| format!("record {number} is no event of memory: {error}"))
+}
+
+fn all_events(path: &Path, store: &mut Store) -> Result<Vec<Event>, MemoryError> {
+    let stored = store.events().map_err(|error| translate(path, error))?;
+    let parsed = (0u64..).zip(&stored).map(|(number, (_, event))| parse(number, event));
+    let parsed: Result<Vec<Option<Event>>, String> = parsed.collect();
+    let error = |reason| MemoryError::Record { path: path.into(), record: 0, reason };
+    Ok(parsed.map_err(error)?.into_iter().flatten().collect())
+}
+
+/// The events of a memory folder, which is left as it is.
+///
+/// # Errors
+/// There is no memory in the folder, another process writes it, or it is damaged.
+pub fn read_events(dir: &Path) -> Result<Vec<Event>, MemoryError> {
+    if !dir.join(manifest::NAME).is_file() {
+        return Err(MemoryError::Missing { path: dir.into() });
+    }
+    Ledger::open(dir).map(|(_, events)| events)
+}
+
+/// The columns of a memory folder, for questions to them alone.
+///
+/// # Errors
+/// There is no memory in the folder, another process writes it, or it is damaged.
+pub fn open_store(dir: &Path) -> Result<Store, MemoryError> {
+    if !dir.join(manifest::NAME).is_file() {
+        return Err(MemoryError::Missing { path: dir.into() });
+    }
+    Store::open(dir).map_err(|error| translate(dir, error))
+}
+
+fn translate(path: &Path, error: StoreError) -> MemoryError {
+    match error {
+        StoreError::Io { what, source } => {
+            let source = std::io::Error::new(source.kind(), format!("{what}: {source}"));
+            MemoryError::Io { path: path.into(), source }
+        }
+        StoreError::Locked(path) => MemoryError::Locked { path },
+        StoreError::Format { found, known } => MemoryError::Format { path: path.join(manifest::NAME), found, known },
+        StoreError::Damaged { file, reason } => MemoryError::Record { path: path.join(file), record: 0, reason },
+        StoreError::Refused(reason) => MemoryError::Record { path: path.into(), record: 0, reason },
+        StoreError::Broken(reason) => MemoryError::Record {
+            path: path.into(),
+            record: 0,
+            reason: format!("an earlier write failed ({reason}): open the folder again"),
+        },
+    }
+}
+
+/// The time axis of the engine: episodes follow each other, each with room for 78 hours.
+pub fn store_time(moment: crate::entry::Moment) -> Result<u64, String> {
+    moment_ns(moment)
+}

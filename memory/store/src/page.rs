@@ -1,0 +1,79 @@
+//! 256 ids: where each object's row is, what is seldom asked, and its parts.
+
+use crate::{
+    NONE, Nanos,
+    block::ROWS,
+    cow::{Run, Stored},
+    event::Part,
+};
+use bytemuck::{Pod, Zeroable};
+
+/// The object was put at least once.
+pub const KNOWN: u8 = 1;
+/// Some of its changes came later than changes of later moments.
+pub const DISORDERED: u8 = 2;
+
+/// Columns by id.
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+pub struct Heads {
+    /// Since when the object is there.
+    pub born: [Nanos; ROWS],
+    /// The latest moment of which something is known of it.
+    pub latest: [Nanos; ROWS],
+    /// Its row; [`NONE`] while it is not there.
+    pub row: [u32; ROWS],
+    /// Sequence number of the event that first put it.
+    pub first: [u32; ROWS],
+    /// The last of its changes, 1 + index; 0 for none.
+    pub last: [u32; ROWS],
+    /// Rotation: the vector part of its unit quaternion.
+    pub rotation: [[f32; 3]; ROWS],
+    /// Which properties have changed since it was put, as far as 16 bits tell.
+    pub touched: [u16; ROWS],
+    /// Source and confidence of the event that first put it.
+    pub origin: [[u8; 2]; ROWS],
+    /// Number of parts.
+    pub parts: [u8; ROWS],
+    /// [`KNOWN`], [`DISORDERED`].
+    pub flags: [u8; ROWS],
+}
+
+/// Columns and parts.
+#[derive(Debug, Clone)]
+pub struct Page {
+    /// The columns.
+    pub heads: Stored<Heads>,
+    /// Parts of all objects, in the order of their ids.
+    pub parts: Run<Part>,
+}
+
+impl Page {
+    /// A page of ids that were never given.
+    pub fn empty() -> Page {
+        let mut heads: Box<Heads> = Box::new(Zeroable::zeroed());
+        heads.row = [NONE; ROWS];
+        Page { heads: Stored::Owned(heads), parts: Run::default() }
+    }
+    fn span(&self, at: usize) -> (usize, usize) {
+        let counts = &self.heads.get().parts;
+        let start = counts.iter().take(at).map(|n| usize::from(*n)).sum();
+        (start, start + usize::from(counts[at % ROWS]))
+    }
+    /// The parts of one object.
+    pub fn parts_of(&self, at: usize) -> &[Part] {
+        let (start, end) = self.span(at);
+        self.parts.get().get(start..end).unwrap_or_default()
+    }
+    /// Gives an object other parts.
+    pub fn set_parts(&mut self, at: usize, parts: &[Part]) {
+        let (start, end) = self.span(at);
+        let all = self.parts.get_mut();
+        if start == all.len() {
+            all.extend_from_slice(parts);
+        } else {
+            all.splice(start..end, parts.iter().copied());
+        }
+        self.heads.get_mut().parts[at % ROWS] = parts.len() as u8;
+    }
+}
