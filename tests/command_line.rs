@@ -146,16 +146,16 @@ fn a_memory_folder_of_another_format_is_refused_and_kept() {
     drop(acm_memory::AcmMemory::open(&memory, acm_memory::default_library().unwrap().into()).unwrap());
     let header = header_file(&memory);
     let text = fs::read(&header).unwrap();
-    let other = String::from_utf8(text).unwrap().replacen('1', "7", 1);
+    let other = String::from_utf8(text).unwrap().replacen('2', "7", 1);
     fs::write(&header, &other).unwrap();
-    refuses(&["run", "put-back-block", "--memory", memory.to_str().unwrap()], &["format 7", "format 1"]);
+    refuses(&["run", "put-back-block", "--memory", memory.to_str().unwrap()], &["format 7", "format 2"]);
     assert_eq!(fs::read_to_string(&header).unwrap(), other);
 }
 
 /// The file that holds the format number: the one that is readable text.
 fn header_file(memory: &Path) -> std::path::PathBuf {
     let files = fs::read_dir(memory).unwrap().map(|entry| entry.unwrap().path());
-    let mut readable = files.filter(|path| fs::read_to_string(path).is_ok_and(|text| text.contains('1')));
+    let mut readable = files.filter(|path| fs::read_to_string(path).is_ok_and(|text| text.starts_with("acm-memory")));
     readable.next().expect("a header file")
 }
 

@@ -90,7 +90,7 @@ fn a_model_reads_the_instruction_and_all_it_says_can_be_shown_given_again_and_re
     // Prompt and reply for a person.
     let asked = &messages(&first, "ask-llm")[0];
     let shown = prints(&["trace", "show", text(&first), "--seq", &asked["seq"].to_string()]);
-    for part in ["prompt parse v1", "- cube: pick, place", &instruction()] {
+    for part in ["prompt parse v2", "- cube: pick, place", &instruction()] {
         assert!(shown.contains(part), "no `{part}` in: {shown}");
     }
     let replied = &messages(&first, "llm-replied")[0];
@@ -99,7 +99,7 @@ fn a_model_reads_the_instruction_and_all_it_says_can_be_shown_given_again_and_re
         assert!(shown.contains(part), "no `{part}` in: {shown}");
     }
     let why = prints(&["trace", "why", text(&first), "--step", "1"]);
-    assert!(why.contains("prompt parse v1") && why.contains("parrot-1"), "{why}");
+    assert!(why.contains("prompt parse v2") && why.contains("parrot-1"), "{why}");
     assert!(prints(&["trace", "export", text(&first), "--html", "-"]).contains("a thing that can be moved"));
 
     // No key is anywhere in it.

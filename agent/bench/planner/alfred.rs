@@ -69,12 +69,7 @@ pub enum Outcome {
 pub fn snake(name: &str) -> String {
     let mut snake = String::new();
     for character in name.chars() {
-        if character.is_uppercase()
-            && !snake.is_empty()
-            && !snake.ends_with(|c: char| c == '_')
-            && name != "CD"
-            && name != "TVStand"
-        {
+        if character.is_uppercase() && !snake.is_empty() && !snake.ends_with('_') && name != "CD" && name != "TVStand" {
             snake.push('_');
         }
         snake.extend(character.to_lowercase());

@@ -160,7 +160,7 @@ fn episodes(result: &mut BenchResult) -> anyhow::Result<Option<Vec<Episode>>> {
 
 /// Descriptions evenly spaced over the rooms that were held out, or over the others.
 fn sample(episodes: &[Episode], held_out: bool, count: usize) -> Vec<(&Episode, &str)> {
-    let chosen = episodes.iter().filter(|e| (alfred::plan_number(&e.floor_plan) % HELD_OUT == 0) == held_out);
+    let chosen = episodes.iter().filter(|e| alfred::plan_number(&e.floor_plan).is_multiple_of(HELD_OUT) == held_out);
     let all: Vec<(&Episode, &str)> =
         chosen.flat_map(|e| e.anns.iter().map(move |annotation| (e, annotation.task_desc.trim()))).collect();
     let step = (all.len() / count.max(1)).max(1);

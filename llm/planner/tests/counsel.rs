@@ -1,7 +1,6 @@
 //! Decisions about which a model may be asked, in a symbolic world.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test that panics fails, which is what it shall do")]
 
-#[allow(dead_code, reason = "other tests use the rest of it")]
 mod world;
 
 use acm_concept::{skill::FailureCause, task::OnUnknown};

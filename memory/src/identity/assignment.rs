@@ -180,8 +180,10 @@ fn marginals(scores: &Scores, percepts: &[usize]) -> Vec<BTreeMap<Option<usize>,
 fn exactly(scores: &Scores, percepts: &[usize], objects: &[usize]) -> Vec<BTreeMap<Option<usize>, f64>> {
     let sets = 1usize << objects.len();
     let bit = |object: usize| objects.binary_search(&object).map_or(0, |at| 1usize << at);
-    // By percept: the bit of each object with the weight of the pair, and the weight of being new, scaled to the best.
-    let rows: Vec<(Vec<(usize, usize, f64)>, f64)> = percepts
+    /// The pairs of a percept, each with its object, that object's bit and the pair's weight; and the weight of being new.
+    type Row = (Vec<(usize, usize, f64)>, f64);
+    // Weights are scaled to the best of each percept.
+    let rows: Vec<Row> = percepts
         .iter()
         .map(|&percept| {
             let pairs = &scores.pairs[percept];

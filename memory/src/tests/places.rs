@@ -123,7 +123,7 @@ fn a_place_with_a_heading_is_reached_modulo_the_symmetry_of_what_stands_there() 
     let mut memory = memory();
     let oblong = Thing::block([0.08, 0.03, 0.04]).at(0.0, 0.0, 0.0).colored(BLUE);
     for frame in 0..8 {
-        look(&mut memory, frame, 1.0, &[oblong], &[], &open_hand(1.0)).unwrap();
+        look(&mut memory, frame, 1.0, std::slice::from_ref(&oblong), &[], &open_hand(1.0)).unwrap();
     }
     let pose = object(&memory, ObjectId(1)).pose().unwrap();
     let turned_by = |turn: f64| {

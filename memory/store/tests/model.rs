@@ -65,7 +65,7 @@ fn batch(world: &mut World, reference: &Naive, time: u64, next: &mut Id) -> Vec<
             }
         };
         // What the naive reference takes for unborn at that moment is no fair question.
-        let born = !late || reference.at(valid, time).get(&op.subjects()[0].unwrap()).is_some();
+        let born = !late || reference.at(valid, time).contains_key(&op.subjects()[0].unwrap());
         events.push(Event::new(if born { valid } else { time }, source, 0.9, vec![op]));
     }
     events

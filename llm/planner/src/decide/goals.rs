@@ -215,11 +215,11 @@ impl Mind<'_> {
         let (id, phrase) = (self.ground.object(index)?.value, self.ground.phrase(index));
         let state = self.view.object(id).map(|entry| entry.state.as_slice()).unwrap_or_default();
         let shown = state.iter().filter(|literal| literal.predicate == "shows" && !literal.negated);
-        let number = shown.filter_map(|literal| match literal.arguments.get(1) {
+        let mut number = shown.filter_map(|literal| match literal.arguments.get(1) {
             Some(Term::Number(number)) if (0.0..=MAX_SHOWN).contains(number) => Some(number.round() as u32),
             _ => None,
         });
-        number.last().ok_or_else(|| {
+        number.next_back().ok_or_else(|| {
             Stuck::look(GiveUpCause::Perception, format!("I cannot read the number that {phrase} ({id}) shows"))
         })
     }

@@ -57,6 +57,7 @@ pub(super) enum Relation {
 }
 
 #[derive(Debug, Clone, PartialEq)]
+#[allow(clippy::large_enum_variant, reason = "a clause has one place: a box would save nothing that counts")]
 pub(super) enum PlaceKind {
     At(NounPhrase, Relation),
     Middle(Option<NounPhrase>),

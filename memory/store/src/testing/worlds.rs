@@ -55,15 +55,17 @@ impl World {
             };
             (0..count).map(one).collect()
         };
-        let mut words = Words::default();
-        words.source = define(Kind::Source, 1, "camera").first().copied().unwrap_or_default();
-        words.categories = define(Kind::Category, categories, "category");
-        words.templates = define(Kind::Template, 40, "template");
-        words.affordances = define(Kind::Affordance, 16, "affordance");
-        words.states = define(Kind::State, 20, "state");
-        words.regions = define(Kind::Region, rooms, "room");
-        words.relations = define(Kind::Relation, 2, "relation");
-        words.fluents = define(Kind::Fluent, 2, "fluent");
+        // Fields are evaluated in this order: the numbers of the words follow it.
+        let words = Words {
+            source: define(Kind::Source, 1, "camera").first().copied().unwrap_or_default(),
+            categories: define(Kind::Category, categories, "category"),
+            templates: define(Kind::Template, 40, "template"),
+            affordances: define(Kind::Affordance, 16, "affordance"),
+            states: define(Kind::State, 20, "state"),
+            regions: define(Kind::Region, rooms, "room"),
+            relations: define(Kind::Relation, 2, "relation"),
+            fluents: define(Kind::Fluent, 2, "fluent"),
+        };
         let mut sum = 0.0;
         let mut frequencies: Vec<f32> = (0..categories)
             .map(|rank| {
