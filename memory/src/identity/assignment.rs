@@ -17,7 +17,7 @@ const WORTH_NAMING: f64 = 0.1;
 /// What is known before a frame of whether things are found that should be: so many that were, and that were not.
 const PRIOR_FOUND: (f64, f64) = (4.5, 0.5);
 /// What is known before a frame of newcomers: so many in so many frames.
-const PRIOR_NEW: (f64, f64) = (0.1, 0.5);
+const PRIOR_NEW: (f64, f64) = (0.075, 0.5);
 /// Rounds in which the frame's own rates are estimated.
 const ROUNDS: u32 = 3;
 /// Rounds of messages between percepts and objects: they converge always, and mostly within ten.
@@ -25,18 +25,20 @@ const MESSAGE_ROUNDS: u32 = 30;
 
 /// How often things are found that should be, and how many things of a frame are new: what a frame says of itself, beside
 /// what is known of frames.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 struct Rates {
     /// Log-odds that an object is found that the camera should see.
     found: f64,
-    /// Logarithm of the expected number of newcomers.
-    new: f64,
+    /// By percept: logarithm of the number of newcomers that are expected by all the others. None speaks for itself.
+    new: Vec<f64>,
 }
 
 impl Rates {
-    fn of(found: f64, lost: f64, new: f64) -> Rates {
+    fn of(found: f64, lost: f64, new: &[f64]) -> Rates {
         let found = (found + PRIOR_FOUND.0) / (lost + PRIOR_FOUND.1);
-        Rates { found: found.ln(), new: ((new + PRIOR_NEW.0) / (1.0 + PRIOR_NEW.1)).ln() }
+        let all: f64 = new.iter().sum();
+        let others = |own: &f64| ((all - own).max(0.0) + PRIOR_NEW.0) / (1.0 + PRIOR_NEW.1);
+        Rates { found: found.ln(), new: new.iter().map(|own| others(own).ln()).collect() }
     }
     /// The scores with the rates in them.
     fn apply(&self, scores: &Scores) -> Scores {
@@ -44,7 +46,7 @@ impl Rates {
         let found = |(object, score): &(usize, f64)| (*object, score + if due(*object) { self.found } else { 0.0 });
         Scores {
             pairs: scores.pairs.iter().map(|row| row.iter().map(found).collect()).collect(),
-            new: scores.new.iter().map(|score| score + self.new).collect(),
+            new: scores.new.iter().zip(&self.new).map(|(score, rate)| score + rate).collect(),
             due: scores.due.clone(),
         }
     }
@@ -52,21 +54,22 @@ impl Rates {
 
 /// The rates of a frame by expectation and maximisation.
 fn rates(scores: &Scores, components: &[Vec<usize>]) -> Rates {
-    let mut rates = Rates::of(0.0, 0.0, 0.0);
+    let mut new = vec![0.0; scores.pairs.len()];
+    let mut rates = Rates::of(0.0, 0.0, &new);
     let due = scores.due.iter().filter(|due| **due).count() as f64;
     for _ in 0..ROUNDS {
         let rated = rates.apply(scores);
-        let (mut found, mut new) = (0.0, 0.0);
-        for sums in components.iter().flat_map(|percepts| marginals(&rated, percepts)) {
-            for (object, probability) in sums {
-                match object {
-                    None => new += probability,
-                    Some(object) if scores.due.get(object) == Some(&true) => found += probability,
-                    Some(_) => {}
-                }
+        let mut found = 0.0;
+        for percepts in components {
+            for (percept, sums) in percepts.iter().zip(marginals(&rated, percepts)) {
+                let matched = |(object, _): &(&Option<usize>, &f64)| {
+                    object.is_some_and(|object| scores.due.get(object) == Some(&true))
+                };
+                found += sums.iter().filter(matched).map(|(_, probability)| probability).sum::<f64>();
+                new[*percept] = sums.get(&None).copied().unwrap_or(0.0);
             }
         }
-        rates = Rates::of(found, (due - found).max(0.0), new);
+        rates = Rates::of(found, (due - found).max(0.0), &new);
     }
     rates
 }
