@@ -1,8 +1,8 @@
 //! Classical planning: operators as data, goals with quantifiers, heuristic search. Pure and deterministic.
 //!
 //! What can be done is a [`Domain`]: operator schemata with conditions and effects, and predicates that follow from others,
-//! read from `operators/`. What is wanted is a [`Problem`]. [`plan`] gives the steps, each with what forced it;
-//! [`simulate`] follows any plan, whoever made it, and says the first condition that is violated.
+//! read from `operators/`. What is wanted is a [`Problem`]. [`plan()`] gives the steps, each with what forced it;
+//! [`simulate()`] follows any plan, whoever made it, and says the first condition that is violated.
 //!
 //! | module | holds |
 //! |---|---|
