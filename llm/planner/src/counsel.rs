@@ -8,6 +8,7 @@ use crate::{
     explanation::{Explanation, Grounds},
     hybrid::TaskPrompt,
     planner::Planner,
+    prompt_file::{self, PromptFile},
     task::Task,
 };
 use acm_concept::ids::ObjectId;
@@ -17,7 +18,7 @@ use acm_memory::{
 };
 use serde::Deserialize;
 use serde_json::Value;
-use std::{collections::BTreeSet, sync::OnceLock};
+use std::collections::BTreeSet;
 
 /// Most ways that are offered.
 const MAX_WAYS: usize = 4;
@@ -92,29 +93,21 @@ struct Answer {
     way: String,
 }
 
-#[derive(Clone, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Text {
-    id: String,
-    version: u32,
-    max_output_tokens: u32,
-    system: String,
-    user: String,
-}
-
-/// The files of `prompts/`. They ship inside the binary: a test reads them, so that they are well formed here.
-fn files(question: Question) -> Option<&'static (Text, Value)> {
-    static SELECT: OnceLock<Option<(Text, Value)>> = OnceLock::new();
-    static REFLECT: OnceLock<Option<(Text, Value)>> = OnceLock::new();
-    let (cell, text, schema) = match question {
-        Question::Select => {
-            (&SELECT, include_str!("../prompts/select.toml"), include_str!("../prompts/select.schema.json"))
-        }
-        Question::Reflect => {
-            (&REFLECT, include_str!("../prompts/reflect.toml"), include_str!("../prompts/reflect.schema.json"))
-        }
-    };
-    cell.get_or_init(|| Some((toml::from_str(text).ok()?, serde_json::from_str(schema).ok()?))).as_ref()
+fn file(question: Question) -> Option<&'static (PromptFile, Value)> {
+    static SELECT: prompt_file::Cell = prompt_file::Cell::new();
+    static REFLECT: prompt_file::Cell = prompt_file::Cell::new();
+    match question {
+        Question::Select => prompt_file::read(
+            &SELECT,
+            include_str!("../prompts/select.toml"),
+            include_str!("../prompts/select.schema.json"),
+        ),
+        Question::Reflect => prompt_file::read(
+            &REFLECT,
+            include_str!("../prompts/reflect.toml"),
+            include_str!("../prompts/reflect.schema.json"),
+        ),
+    }
 }
 
 impl Planner {
@@ -227,7 +220,7 @@ fn prompt(
     ways: &[Way],
     may_look: bool,
 ) -> Option<TaskPrompt> {
-    let (file, schema) = files(question)?;
+    let (file, schema) = file(question)?;
     let goal = ways.first().map(|(_, explanation)| explanation.goal.as_str()).unwrap_or_default();
     let near: BTreeSet<ObjectId> = ways.iter().map(|(step, _)| step.candidate.part.object).collect();
     // What the ways act on goes first, so that it is told of however many things there are.

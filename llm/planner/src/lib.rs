@@ -29,6 +29,7 @@ pub mod hybrid;
 pub mod language;
 pub mod lexicon;
 mod planner;
+mod prompt_file;
 mod search;
 pub mod task;
 

@@ -3,7 +3,7 @@ use super::*;
 #[test]
 fn the_files_are_well_formed_and_the_schemas_take_the_names() {
     for question in [Question::Select, Question::Reflect] {
-        let (text, schema) = files(question).unwrap();
+        let (text, schema) = file(question).unwrap();
         assert_eq!((text.id.as_str(), text.version), (question.stage(), 1));
         let names = names(question, 3, true);
         let schema = filled(schema.clone(), &names);

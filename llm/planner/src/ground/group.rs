@@ -4,12 +4,15 @@ use super::{Grounder, Stuck, history::place_at};
 use crate::{
     decision::GiveUpCause,
     explanation::ResolvedReference,
-    task::{Direction, Ordering, Quantity, ReferenceIndex},
+    task::{Direction, ObjectReference, Ordering, Quantity, ReferenceIndex},
 };
 use acm_concept::ids::ObjectId;
-use acm_memory::entry::ObjectEntry;
+use acm_memory::{
+    entry::{ObjectEntry, Presence},
+    query::Retrieval,
+};
 
-impl Grounder<'_> {
+impl<'a> Grounder<'a> {
     /// What a closure gives while a group's reference means one of its members.
     pub fn bound<T>(&self, group: ReferenceIndex, member: ObjectId, then: impl FnOnce() -> T) -> T {
         let before = self.turns.borrow_mut().insert(group, member);
@@ -51,16 +54,29 @@ impl Grounder<'_> {
         if members.is_empty() {
             return Err(self.none_fits(reference, &retrieval));
         }
-        let names = members.iter().map(|entry| entry.id.to_string()).collect::<Vec<_>>().join(", ");
+        self.keep_group(reference, retrieval, &members);
+        Ok(members.iter().map(|entry| entry.id).collect())
+    }
+
+    /// The members of a group that are present now.
+    pub(super) fn group(&self, index: ReferenceIndex, depth: u32) -> Result<Vec<&'a ObjectEntry>, Stuck> {
+        let reference = self.reference(index)?;
+        let (retrieval, contenders) = self.contenders(index, reference, depth)?;
+        let present = contenders.into_iter().filter(|entry| entry.presence == Presence::Present).collect();
+        let present = self.confirmed(present)?;
+        self.keep_group(reference, retrieval, &present);
+        Ok(present)
+    }
+
+    fn keep_group(&self, reference: &ObjectReference, retrieval: Retrieval, members: &[&ObjectEntry]) {
         self.keep(ResolvedReference {
             phrase: reference.phrase.clone(),
             object: None,
             place: None,
             retrieval: Some(retrieval),
             recall: None,
-            how: names,
+            how: members.iter().map(|entry| entry.id.to_string()).collect::<Vec<_>>().join(", "),
             guessed: false,
         });
-        Ok(members.iter().map(|entry| entry.id).collect())
     }
 }

@@ -84,25 +84,6 @@ impl<'a> Grounder<'a> {
         Ok(Meant { value: chosen, guessed })
     }
 
-    /// The members of a group that are present now.
-    pub(super) fn group(&self, index: ReferenceIndex, depth: u32) -> Result<Vec<&'a ObjectEntry>, Stuck> {
-        let reference = self.reference(index)?;
-        let (retrieval, contenders) = self.contenders(index, reference, depth)?;
-        let present = contenders.into_iter().filter(|entry| entry.presence == Presence::Present).collect();
-        let present = self.confirmed(present)?;
-        let names = present.iter().map(|entry| entry.id.to_string()).collect::<Vec<_>>().join(", ");
-        self.keep(ResolvedReference {
-            phrase: reference.phrase.clone(),
-            object: None,
-            place: None,
-            retrieval: Some(retrieval),
-            recall: None,
-            how: names,
-            guessed: false,
-        });
-        Ok(present)
-    }
-
     pub(super) fn reference(&self, index: ReferenceIndex) -> Result<&'a ObjectReference, Stuck> {
         let text = || format!("the task has no reference {index}; read the instruction again");
         self.task.references.get(index).ok_or_else(|| Stuck::give_up(GiveUpCause::Plan, text()))

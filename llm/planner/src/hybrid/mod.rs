@@ -13,12 +13,12 @@ pub use form::TaskForm;
 use crate::{
     language::{MAX_BYTES, ParseError},
     lexicon::Lexicon,
+    prompt_file::{self, PromptFile},
     task::Task,
 };
 use acm_concept::template::TemplateLibrary;
-use serde::Deserialize;
 use serde_json::Value;
-use std::{collections::BTreeSet, sync::OnceLock};
+use std::collections::BTreeSet;
 
 const TEXT: &str = include_str!("../../prompts/parse.toml");
 const SCHEMA: &str = include_str!("../../prompts/parse.schema.json");
@@ -40,20 +40,9 @@ pub struct TaskPrompt {
     pub max_output_tokens: u32,
 }
 
-#[derive(Clone, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Text {
-    id: String,
-    version: u32,
-    max_output_tokens: u32,
-    system: String,
-    user: String,
-}
-
-/// The files of `prompts/`. They ship inside the binary: a test reads them, so that they are well formed here.
-fn files() -> Option<&'static (Text, Value)> {
-    static FILES: OnceLock<Option<(Text, Value)>> = OnceLock::new();
-    FILES.get_or_init(|| Some((toml::from_str(TEXT).ok()?, serde_json::from_str(SCHEMA).ok()?))).as_ref()
+fn file() -> Option<&'static (PromptFile, Value)> {
+    static PARSE: prompt_file::Cell = prompt_file::Cell::new();
+    prompt_file::read(&PARSE, TEXT, SCHEMA)
 }
 
 /// The question for an instruction.
@@ -61,7 +50,7 @@ pub(crate) fn prompt(lexicon: &Lexicon, library: &TemplateLibrary, text: &str) -
     if text.len() > MAX_BYTES {
         return Err(ParseError::TooLong { unit: "bytes", length: text.len(), limit: MAX_BYTES });
     }
-    let (false, Some((file, schema))) = (text.trim().is_empty(), files()) else { return Err(ParseError::Empty) };
+    let (false, Some((file, schema))) = (text.trim().is_empty(), file()) else { return Err(ParseError::Empty) };
     let names = Names::new(lexicon, library);
     let nouns: Vec<String> = names.nouns.iter().map(|noun| noun_line(library, noun)).collect();
     Ok(TaskPrompt {
