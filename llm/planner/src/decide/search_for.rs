@@ -5,7 +5,7 @@ use super::{Grounded, Mind};
 use crate::{
     decision::Decision,
     ground::{Stuck, has_effect},
-    search::{Want, believed, covered_by, is_cover},
+    search::{Want, believed, covered_by, is_cover, shuts},
     task::Subtask,
 };
 use acm_concept::{
@@ -52,13 +52,14 @@ impl Mind<'_> {
             return (!known).then(|| (Want::Away(entry.id), Literal::new("moved", about())));
         }
         let open = Literal::new("open", about());
-        let shut = has_effect(self.view, entry, "open") && believed(self.view, &open).truth != Truth::Yes;
+        let shut =
+            shuts(entry) && has_effect(self.view, entry, "open") && believed(self.view, &open).truth != Truth::Yes;
         shut.then(|| (Want::Holds(open.clone()), open))
     }
 
     /// Whether a thing was opened or lifted in this episode: what it hid was seen then.
     fn was_unveiled(&self, entry: &ObjectEntry) -> bool {
-        if !is_cover(entry) && !has_effect(self.view, entry, "open") {
+        if !is_cover(entry) && !shuts(entry) {
             return false;
         }
         let episode = self.view.progress().instructed.episode;

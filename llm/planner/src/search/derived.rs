@@ -20,11 +20,18 @@ use acm_memory::{
 const COVERING: &str = "covering";
 /// Affordance of what holds things within its walls.
 const CONTAINS: &str = "contains";
+/// Affordance of what stands before an inside and can be shut: a door, a lid.
+const CLOSABLE: &str = "closable";
 /// Covers that are considered for one thing, the nearest first.
 const MAX_COVERS: usize = 4;
 
 pub(crate) fn is_cover(entry: &ObjectEntry) -> bool {
     affords(entry, COVERING)
+}
+
+/// Whether something may lie behind or in a thing as long as it is shut: a tap is opened too, but hides nothing.
+pub(crate) fn shuts(entry: &ObjectEntry) -> bool {
+    affords(entry, CONTAINS) || affords(entry, CLOSABLE)
 }
 
 fn affords(entry: &ObjectEntry, word: &str) -> bool {

@@ -15,7 +15,7 @@ use acm_concept::{
 use acm_memory::{MemoryView, query::SkillCandidate};
 use state::State;
 
-pub(crate) use derived::{brings_about, is_cover, place_over};
+pub(crate) use derived::{brings_about, is_cover, place_over, shuts};
 pub(crate) use state::same_atom;
 use std::{
     cmp::Ordering,
