@@ -166,8 +166,14 @@ impl Grounder {
         aid.cut(scene, &expectation.nouns, &mut segments);
         let standing: Vec<bool> = segments.labels.iter().map(|label| *label != NONE).collect();
         let context = |remembered| Context { remembered, ..unremembered };
+        let as_expected = |thing: &Explained| {
+            let context = Context { remembered: Some(thing.known), ..unremembered };
+            assemble::object(scene, context, std::slice::from_ref(&thing.fit), &thing.evidence, &thing.pixels, 1.0)
+        };
+        let (patches, expected): (_, Vec<GroundedObject>) =
+            rayon::join(|| patches::find(scene, &standing), || explained.par_iter().filter_map(as_expected).collect());
         let (mut objects, mut bodies) = (Vec::new(), Bodies::default());
-        for patch in patches::find(scene, &standing) {
+        for patch in patches {
             let measured = Measured { plan: patch.plan, height_m: 0.0, base: Base::At(0.0), seen_by: SeenBy::Color };
             let context = context(remembered.at(&patch.pixels, SeenBy::Color));
             let ranked = hypotheses::rank(context, &measured, &patch.evidence);
@@ -177,11 +183,7 @@ impl Grounder {
                 objects.push(object);
             }
         }
-        let as_expected = |thing: &Explained| {
-            let context = Context { remembered: Some(thing.known), ..unremembered };
-            assemble::object(scene, context, std::slice::from_ref(&thing.fit), &thing.evidence, &thing.pixels, 1.0)
-        };
-        objects.par_extend(explained.par_iter().filter_map(as_expected));
+        objects.extend(expected);
         explained.iter().for_each(|thing| bodies.add(std::slice::from_ref(&thing.fit)));
         let mut open = segments.pixels();
         explained.iter().for_each(|thing| open[thing.label as usize].clear());

@@ -79,7 +79,7 @@ impl Studio {
         };
         let (sensor, _) = view::sensor(&self.plan, seed)?;
         let camera = sensor.true_camera(&scene.camera).pose;
-        let [frame, _] = &view.frames;
+        let frame = &view.frames[0];
         let bases: Vec<f64> = scene.things.iter().map(|thing| thing.pose.translation.z - TABLE_M).collect();
         let least = self.plan.layout.least_pixels;
         let labels = whole(&view.labels, frame.header.intrinsics.width as usize, bases.len(), least);

@@ -10,7 +10,7 @@ const TRUTH: Rgb<u8> = Rgb([255, 0, 0]);
 
 /// What was reported over the colour image, what is true as red outlines, and what became of each thing.
 pub fn draw(view: &View, percepts: &Percepts, fates: &[Fate], library: &TemplateLibrary) -> RgbImage {
-    let [frame, _] = &view.frames;
+    let frame = &view.frames[0];
     let mut picture = overlay::draw(frame, percepts, &[], library);
     let width = frame.header.intrinsics.width as usize;
     for (index, label) in view.labels.iter().enumerate() {

@@ -86,6 +86,8 @@ pub struct CameraPlan {
     pub distance_m: Range<f64>,
     /// Above the table, seen from the middle of the things.
     pub elevation_deg: Range<f64>,
+    /// Frames of each scene, which differ in their noise alone.
+    pub frames: usize,
 }
 
 /// What stands how near to what. Metres.
@@ -217,6 +219,8 @@ pub struct CrowdPlan {
     pub largest_m: Range<f64>,
     /// Of the camera from the middle of the things, metres.
     pub distance_m: f64,
+    /// Frames of each scene: all but the last are what memory knows it from.
+    pub frames: usize,
 }
 
 impl Plan {
@@ -224,7 +228,7 @@ impl Plan {
     pub fn crowded(&self) -> Plan {
         let crowd = &self.crowd;
         let layout = LayoutPlan { count: [crowd.count; 2], largest_m: crowd.largest_m, ..self.layout.clone() };
-        let camera = CameraPlan { distance_m: [crowd.distance_m; 2], ..self.camera.clone() };
+        let camera = CameraPlan { distance_m: [crowd.distance_m; 2], frames: crowd.frames, ..self.camera.clone() };
         Plan { layout, camera, ..self.clone() }
     }
 
@@ -268,6 +272,8 @@ impl Plan {
             );
         }
         let counts = [
+            ("camera.frames", [self.camera.frames; 2]),
+            ("crowd.frames", [self.crowd.frames; 2]),
             ("layout.count", self.layout.count),
             ("small_cubes.count", self.small_cubes.count),
             ("crowd.count", [self.crowd.count; 2]),
@@ -275,6 +281,7 @@ impl Plan {
         for (field, [least, most]) in counts {
             ensure!(least > 0 && least <= most && most <= 32, "{field}: [{least}, {most}] is no range from 1 to 32");
         }
+        ensure!(self.crowd.frames > 1, "crowd.frames: memory knows nothing before the first");
         SensorProfile::named(&self.profile).context("profile")?;
         ensure!(self.attempts > 0, "attempts: there must be one");
         ensure!(!self.order.contains(&RowKind::SmallCubes), "order: small cubes are no row of it");

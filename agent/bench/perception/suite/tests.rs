@@ -64,7 +64,7 @@ impl Case {
         solids.into_iter().map(|own| PlacedSolid { pose: thing.pose * own.pose, ..own }).collect()
     }
     fn score(&self, objects: Vec<GroundedObject>) -> Scored {
-        let [frame, _] = &self.view.frames;
+        let frame = &self.view.frames[0];
         let percepts = Percepts {
             frame: frame.header.clone(),
             support: None,
@@ -135,7 +135,7 @@ fn a_seed_gives_the_same_scene_and_the_same_noise() {
             case.scene.things.iter().map(|thing| (thing.template.clone(), thing.pose, thing.touches)).collect()
         };
         assert_eq!(truth(&first), truth(&again));
-        let [one, two] = &first.view.frames;
+        let (one, two) = (&first.view.frames[0], &first.view.frames[1]);
         assert_ne!(one.depth, two.depth, "the two frames differ in their noise");
         assert_eq!(one.header.camera_pose, first.scene.camera.pose, "perception is told the nominal pose");
         let Some(other) = case(kind, touching, seed + 10) else { return };

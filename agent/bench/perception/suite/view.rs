@@ -30,14 +30,14 @@ const FIRST: u32 = 3;
 const TABLE_SIZE: DVec3 = DVec3::new(2.0, 2.0, 0.04);
 /// A surface's direction is taken over so many pixels, so many away from an edge.
 const SPAN_PX: isize = 3;
-/// Time between the two frames, seconds.
+/// Time between two frames, seconds.
 const BETWEEN_S: f64 = 1.0;
 
 /// The scene as it was seen.
 #[derive(Debug, Clone)]
 pub struct View {
-    /// Two frames of the same scene, which differ in their noise alone. They carry the nominal calibration.
-    pub frames: [RgbdFrame; 2],
+    /// Frames of the same scene, which differ in their noise alone. They carry the nominal calibration.
+    pub frames: Vec<RgbdFrame>,
     /// Place in the scene + 1 of what each pixel truly shows, 0 for table and floor.
     pub labels: Vec<u16>,
 }
@@ -78,8 +78,9 @@ impl Eye {
         {
             return Ok(None);
         }
-        let mut frame = |number| frame(scene, &sensor, &rendered, number, &mut rng);
-        Ok(Some(View { frames: [frame(0)?, frame(1)?], labels }))
+        let frame = |number| frame(scene, &sensor, &rendered, number, &mut rng);
+        let frames = (0..plan.camera.frames as u64).map(frame).collect::<anyhow::Result<_>>()?;
+        Ok(Some(View { frames, labels }))
     }
 
     /// Whether enough of each thing's silhouette is seen.
