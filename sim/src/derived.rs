@@ -51,3 +51,6 @@ impl Derived {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;
