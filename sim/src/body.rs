@@ -173,6 +173,7 @@ impl Body {
             speed,
             spin,
             up.z.clamp(-1.0, 1.0).acos(),
+            wrap_angle(2.0 * pose.rotation.z.atan2(pose.rotation.w)),
             pose.translation.distance(self.start.translation),
             wrap_angle(pose.yaw() - self.start.yaw()).abs(),
             contacts.pads_touching(&self.colliders) as f64,

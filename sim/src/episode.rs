@@ -149,7 +149,13 @@ impl Simulation {
             let joints: Vec<i64> =
                 body.joints.iter().map(|(_, joint)| (joint.joint.start * 1e3).round() as i64).collect();
             let (at, size) = (rounded(body.start.translation), rounded(body.placed.size()));
-            format!("{at} {yaw} {size} {color:?} {joints:?}")
+            // Things may differ in a mark alone.
+            let pieces = body.placed.links.iter().flat_map(|link| &link.pieces).map(|piece| {
+                let (low, high) = piece.bounds(&acm_concept::pose::Pose::IDENTITY);
+                format!("{} {} {:?}", rounded(low), rounded(high), piece.color)
+            });
+            let pieces: Vec<String> = pieces.collect();
+            format!("{at} {yaw} {size} {color:?} {joints:?} {pieces:?}")
         };
         let mut lines: Vec<String> = world.bodies.iter().map(line).collect();
         lines.sort();
@@ -171,7 +177,7 @@ impl Simulation {
     pub fn inventory(&self) -> Vec<(String, Vec<String>)> {
         let world = self.world();
         let of = |body: &Body| {
-            let lines = info::lines(&world.models[body.placed.spec], &body.placed.links, &body.joints);
+            let lines = info::lines(&body.placed.model, &body.placed.links, &body.joints);
             (body.placed.name.clone(), lines)
         };
         world.bodies.iter().map(of).collect()

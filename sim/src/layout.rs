@@ -62,8 +62,9 @@ impl Layout {
         let mut draws = Draws::default();
         let mut from = 0;
         for _ in 0..world.attempts {
-            for spec in world.draws.iter().skip(from) {
-                draws.draw(spec, &mut stream)?;
+            if let Some(again) = draw_on(world, from, &mut draws, &mut stream)? {
+                from = again;
+                continue;
             }
             let layout = Layout::of(world, &draws, seed)?;
             match layout.rejected_by(world)? {
@@ -157,7 +158,7 @@ impl Layout {
     }
 
     fn rejected_by<'a>(&self, world: &'a WorldSpec) -> Result<Option<&'a RejectSpec>, LayoutError> {
-        for spec in &world.rejects {
+        for spec in world.rejects.iter().filter(|spec| spec.after.is_none()) {
             let rejected = match &spec.rule {
                 RejectRule::When(condition) => evaluate("random.reject.when", condition, &self.scope())? != 0.0,
                 RejectRule::Near { between, nearer_than_m } => self.gap_between(world, between)? < *nearer_than_m,
@@ -189,6 +190,26 @@ impl Layout {
         }
         self.copies(world, name).map(|object| solids_at(object, &object.pose)).collect()
     }
+}
+
+/// Makes all draws from one on. Says from which one on to draw anew, if a rule that looks at once rejects.
+fn draw_on(
+    world: &WorldSpec,
+    from: usize,
+    draws: &mut Draws,
+    stream: &mut Stream,
+) -> Result<Option<usize>, LayoutError> {
+    for (at, spec) in world.draws.iter().enumerate().skip(from) {
+        draws.draw(spec, stream)?;
+        for rule in world.rejects.iter().filter(|rule| rule.after == Some(at)) {
+            if let RejectRule::When(condition) = &rule.rule
+                && evaluate("random.reject.when", condition, &draws.scope())? != 0.0
+            {
+                return Ok(Some(rule.redraw_from));
+            }
+        }
+    }
+    Ok(None)
 }
 
 /// Distance between two sets of solids, metres; 0 where they touch or overlap.

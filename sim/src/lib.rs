@@ -25,6 +25,7 @@ mod audit;
 mod body;
 mod contact;
 mod convert;
+mod derived;
 mod episode;
 mod event;
 #[cfg(test)]
@@ -39,6 +40,8 @@ mod placed;
 mod profile;
 mod random;
 mod report;
+#[cfg(test)]
+mod rmbench;
 mod robot;
 mod scenario;
 mod scene;

@@ -7,8 +7,8 @@ use crate::{
 use acm_concept::expression::Expression;
 use serde::{Deserialize, Serialize};
 
-const WORLD_VARIABLES: [&str; 7] =
-    ["others_moved", "commanded_opening", "pad_contact", "tcp_x", "tcp_y", "tcp_z", "time"];
+const WORLD_VARIABLES: [&str; 8] =
+    ["others_moved", "commanded_opening", "pad_contact", "tcp_x", "tcp_y", "tcp_z", "hands_moved", "time"];
 
 /// How an episode is judged. `strict` decides.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -3,7 +3,7 @@
 use crate::{
     layout::{LayoutError, number, vector},
     model::{
-        self, Link, Piece, Weight,
+        self, Link, ObjectModel, Piece, Weight,
         normalise::{self, Original},
         shape::Shape,
     },
@@ -21,6 +21,7 @@ use glam::DVec3;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rapier3d::parry::shape::SharedShape;
+use std::sync::Arc;
 
 /// An object at its start.
 #[derive(Debug, Clone)]
@@ -29,7 +30,7 @@ pub(crate) struct Placed {
     pub(crate) name: String,
     /// Index of its specification.
     pub(crate) spec: usize,
-    pub(crate) model: String,
+    pub(crate) model: Arc<ObjectModel>,
     pub(crate) fixed: bool,
     /// As in its model, but as this copy is made: `joint.start` is where this copy's joint starts.
     pub(crate) links: Vec<Link>,
@@ -62,8 +63,9 @@ impl Placed {
             let friction = make.friction.unwrap_or(link.friction);
             Link { pieces, joint, weight: make.weight(link), friction, ..link.clone() }
         };
-        let mut links: Vec<Link> = spec.model.links.iter().enumerate().map(link).collect();
-        if let Some(loaded) = &spec.model.loaded {
+        let model = make.model.clone();
+        let mut links: Vec<Link> = model.links.iter().enumerate().map(link).collect();
+        if let Some(loaded) = &model.loaded {
             for (link, original) in links.iter_mut().zip(&loaded.originals) {
                 normalise(link, original.as_ref(), &mut dice.dynamics);
             }
@@ -71,10 +73,10 @@ impl Placed {
         let mut object = Placed {
             name,
             spec: index,
-            model: spec.model.model.clone(),
             fixed: spec.fixed,
             links,
-            passing: spec.model.passing.clone(),
+            passing: model.passing.clone(),
+            model,
             pose,
             texture: make.texture,
         };
@@ -165,6 +167,7 @@ pub(crate) fn solids_at(object: &Placed, pose: &Pose) -> Vec<(Pose, SharedShape)
 
 /// How one copy is made differently from its model on purpose.
 pub(crate) struct Make {
+    model: Arc<ObjectModel>,
     scale: DVec3,
     hue_deg: Option<f64>,
     texture: Option<Pattern>,
@@ -221,7 +224,7 @@ impl Make {
         let density_kg_m3 = within(&spec.name, "density_kg_m3", spec.density_kg_m3.as_ref(), DENSITIES, scope)?;
         let friction = within(&spec.name, "friction", spec.friction.as_ref(), FRICTIONS, scope)?;
         let texture = texture::chosen(&spec.name, &spec.textures, scope)?;
-        Ok(Make { scale, hue_deg, texture, density_kg_m3, friction, starts })
+        Ok(Make { model: chosen(spec, scope)?, scale, hue_deg, texture, density_kg_m3, friction, starts })
     }
 
     /// What a link weighs.
@@ -241,6 +244,17 @@ impl Make {
         }
         piece
     }
+}
+
+/// The model of which a copy is made.
+fn chosen(spec: &ObjectSpec, scope: &Scope) -> Result<Arc<ObjectModel>, LayoutError> {
+    let Some(choice) = &spec.choice else { return Ok(spec.model.clone()) };
+    let which = number(&spec.name, &choice.which, scope)?;
+    let found = (which >= 0.0 && which.fract() == 0.0).then(|| choice.models.get(which as usize)).flatten();
+    found.cloned().ok_or_else(|| {
+        let reason = format!("`which` is {which}, it must be a whole number from 0 to {}", choice.models.len() - 1);
+        LayoutError::Value { name: spec.name.clone(), reason }
+    })
 }
 
 /// How much each edge grows and how wide the bevel is. Three numbers are always drawn, so that one object's share

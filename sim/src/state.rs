@@ -1,7 +1,7 @@
 //! The judge's variables and their values.
 
 use crate::{
-    fluent,
+    derived, fluent,
     layout::Layout,
     oracle::{self, Watch},
     scenario::{ObjectSpec, Scenario, WorldSpec},
@@ -13,11 +13,13 @@ pub(crate) fn names(scenario: &Scenario) -> Vec<String> {
     let spec = &scenario.world;
     let objects = spec.objects.iter().map(|o| (o.count.is_none().then_some(o.name.as_str()), &*o.model));
     let places = spec.places.iter().flat_map(|place| ["x", "y", "z"].map(|axis| format!("{}_{axis}", place.name)));
-    let scalars = spec.draws.iter().filter(|draw| draw.count.is_none()).map(|draw| draw.name.clone());
+    let scalars = spec.draws.iter().flat_map(|draw| draw.scalars());
     let mut names = oracle::names(objects, &places.chain(scalars).collect::<Vec<_>>());
     let single: Vec<&str> = spec.objects.iter().filter(|o| o.count.is_none()).map(|o| o.name.as_str()).collect();
     let regions = spec.regions.iter().map(|region| region.name.as_str());
     names.extend(fluent::names(regions, spec.fluents.iter().map(|fluent| fluent.name.as_str()), &single));
+    let points = spec.points.iter().map(|point| point.name.as_str());
+    names.extend(derived::names(points, spec.derived.iter().map(|number| number.name.as_str())));
     names
 }
 
@@ -25,7 +27,7 @@ pub(crate) fn names(scenario: &Scenario) -> Vec<String> {
 pub(crate) fn constants(spec: &WorldSpec, layout: &Layout) -> Vec<f64> {
     let places = layout.places.iter().flat_map(|(_, point)| point.to_array());
     let scalar = |name: &str| layout.draws.scalars().find(|(known, _)| *known == name).map_or(f64::NAN, |(_, v)| v);
-    let scalars = spec.draws.iter().filter(|draw| draw.count.is_none()).map(|draw| scalar(&draw.name));
+    let scalars = spec.draws.iter().flat_map(|draw| draw.scalars()).map(|name| scalar(&name));
     places.chain(scalars).collect()
 }
 
@@ -41,12 +43,15 @@ pub(crate) fn fill(world: &World, values: &mut Vec<f64>) {
     values.push(world.bystanders.iter().map(moved).fold(0.0, f64::max));
     values.push(world.robot.commanded_opening());
     values.push(world.contacts.pads_in_contact() as f64);
-    values.extend([tcp.x, tcp.y, tcp.z, world.seconds()]);
+    let hands = world.robot.hands(physics).zip(&world.hands_start);
+    let hands_moved = hands.map(|(hand, start)| hand.at.distance(*start)).fold(0.0, f64::max);
+    values.extend([tcp.x, tcp.y, tcp.z, hands_moved, world.seconds()]);
     values.extend(&world.constants);
     for body in world.bodies.iter().filter(|body| !body.is_copy) {
         body.values(physics, &world.contacts, values);
     }
     world.fluents.fill(world, values);
+    world.derived.fill(world, values);
 }
 
 /// What an object's lamps and gauges show. Copies have no variables of their own, so that theirs show only what the

@@ -114,7 +114,7 @@ pub enum TrueShape {
 pub(crate) fn true_objects(world: &World) -> Vec<TrueObject> {
     let object = |body: &Body| TrueObject {
         name: body.placed.name.clone(),
-        model: body.placed.model.clone(),
+        model: body.placed.model.model.clone(),
         pose: body.pose(&world.physics),
         size_m: body.placed.size(),
         color: body.placed.color().unwrap_or_default(),

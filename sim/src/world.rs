@@ -4,11 +4,11 @@ use crate::{
     audit::{Audit, AuditReport},
     body::Body,
     contact::Contacts,
+    derived::Derived,
     event::{self, Event},
     fluent::Fluents,
     layout::{Layout, LayoutError, number, vector},
     mishap::{Mishap, MishapKind},
-    model::ObjectModel,
     oracle::{Judge, OracleVerdict},
     placed::Placed,
     profile::PhysicsProfile,
@@ -27,9 +27,9 @@ use acm_concept::{
     time::Time,
 };
 use acm_render::{Lighting, Pattern, PointLight, Sun};
+use glam::DVec3;
 use rapier3d::prelude::{ColliderBuilder, ColliderHandle, PhysicsWorld, RigidBodyBuilder, Vector};
 use rustix::time::ClockId;
-use std::sync::Arc;
 
 /// How long the world settles before the episode begins, seconds.
 const SETTLE_S: f64 = 0.5;
@@ -42,19 +42,20 @@ pub(crate) struct World {
     pub(crate) profile: PhysicsProfile,
     pub(crate) robot: Robot,
     pub(crate) bodies: Vec<Body>,
-    /// Of the scenario's objects, in their order.
-    pub(crate) models: Vec<Arc<ObjectModel>>,
     pub(crate) surfaces: Vec<(ColliderHandle, SurfaceSpec)>,
     pub(crate) contacts: Contacts,
     pub(crate) timings: SimTimings,
     pub(crate) events: Vec<Event>,
     pub(crate) mishaps: Vec<Mishap>,
     pub(crate) fluents: Fluents,
+    pub(crate) derived: Derived,
     pub(crate) judge: Judge,
     pub(crate) audit: Audit,
     pub(crate) lighting: Lighting,
     /// Factors by which the cameras' colours are too bright.
     pub(crate) exposures: Vec<f64>,
+    /// Where the hands were when the episode began.
+    pub(crate) hands_start: Vec<DVec3>,
     /// What is painted on each surface.
     pub(crate) textures: Vec<Option<Pattern>>,
     /// Names of the judge's variables, and their values.
@@ -113,7 +114,9 @@ impl World {
             state: vec![0.0; variables.len()],
             mishaps: mishaps(spec, options),
             fluents: Fluents::build(spec, layout, &variables).map_err(layout_error)?,
+            derived: Derived::build(spec, layout, &variables).map_err(layout_error)?,
             lighting: lighting(spec, layout).map_err(layout_error)?,
+            hands_start: Vec::new(),
             exposures: exposures(spec, layout).map_err(layout_error)?,
             textures: textures(spec, layout).map_err(layout_error)?,
             contacts: Contacts::default(),
@@ -122,7 +125,6 @@ impl World {
             stopped: false,
             steps: 0,
             events,
-            models: spec.objects.iter().map(|object| object.model.clone()).collect(),
             surfaces,
             bodies,
             robot,
@@ -157,6 +159,7 @@ impl World {
             body.measure(&self.physics);
         }
         self.contacts.read(&self.physics, &self.robot);
+        self.hands_start = self.robot.hands(&self.physics).map(|hand| hand.at).collect();
         self.refresh_state();
         self.look_for_causes();
         Ok(())

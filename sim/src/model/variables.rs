@@ -2,9 +2,9 @@
 
 use super::{ObjectModel, joint::Joint};
 
-/// Of every object: base frame in metres, speed in m/s and rad/s, angle from upright, distance and turn from the
-/// start, pads in contact.
-pub(crate) const OF_OBJECT: [&str; 9] = ["x", "y", "z", "speed", "spin", "tilt", "moved", "turned", "touched"];
+/// Of every object: base frame in metres, speed in m/s and rad/s, angle from upright, turn about z without the tilt,
+/// distance and turn from the start, pads in contact.
+pub(crate) const OF_OBJECT: [&str; 10] = ["x", "y", "z", "speed", "spin", "tilt", "yaw", "moved", "turned", "touched"];
 /// Of an object with a press counter, of its first one.
 const OF_COUNTER: [&str; 3] = ["pressed", "presses", "depth"];
 

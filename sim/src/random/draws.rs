@@ -15,15 +15,47 @@ pub(crate) struct DrawSpec {
     pub(crate) kind: DrawKind,
     /// How many values; `None` is one plain value.
     pub(crate) count: Option<Expression>,
+    /// How many values where the file says so with a plain number: each of them then has a name of its own.
+    pub(crate) fixed: Option<usize>,
+}
+
+/// Name of one value of a list of draws.
+pub(crate) fn element(name: &str, place: usize) -> String {
+    format!("{name}_{place}")
+}
+
+impl DrawSpec {
+    /// Names of its plain values.
+    pub(crate) fn scalars(&self) -> Vec<String> {
+        match (&self.count, self.fixed) {
+            (None, _) => vec![self.name.clone()],
+            (Some(_), fixed) => (0..fixed.unwrap_or(0)).map(|place| element(&self.name, place)).collect(),
+        }
+    }
 }
 
 #[derive(Debug, Clone)]
 pub(crate) enum DrawKind {
-    Uniform { low: Expression, high: Expression },
-    Normal { mean: Expression, deviation: Expression },
-    Integer { low: Expression, high: Expression },
-    Choice { from: Vec<f64> },
+    Uniform {
+        low: Expression,
+        high: Expression,
+    },
+    Normal {
+        mean: Expression,
+        deviation: Expression,
+    },
+    Integer {
+        low: Expression,
+        high: Expression,
+    },
+    Choice {
+        from: Vec<f64>,
+    },
     Permutation,
+    /// No draw: a number that follows from others.
+    Value {
+        is: Expression,
+    },
 }
 
 /// Why a draw could not be made.
@@ -94,8 +126,15 @@ impl Draws {
         };
         let values = spec.values(count, &scope, stream)?;
         match (count, values.first()) {
-            (None, Some(value)) => drop(self.scalars.insert(spec.name.clone(), *value)),
-            _ => drop(self.lists.insert(spec.name.clone(), values)),
+            (None, Some(value)) => {
+                self.scalars.insert(spec.name.clone(), *value);
+            }
+            _ => {
+                for (place, value) in values.iter().enumerate().take(spec.fixed.unwrap_or(0)) {
+                    self.scalars.insert(element(&spec.name, place), *value);
+                }
+                self.lists.insert(spec.name.clone(), values);
+            }
         }
         Ok(())
     }
@@ -135,6 +174,7 @@ impl DrawSpec {
                 let last = from.len().saturating_sub(1) as i64;
                 times.filter_map(|_| from.get(stream.integer(0, last) as usize).copied()).collect()
             }
+            DrawKind::Value { is } => vec![scope.evaluate(is)?],
             DrawKind::Permutation => {
                 stream.permutation(count.unwrap_or(1)).into_iter().map(|place| place as f64).collect()
             }

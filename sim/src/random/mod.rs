@@ -5,5 +5,5 @@ mod numpy;
 mod stream;
 
 pub use draws::DrawError;
-pub(crate) use draws::{DrawKind, DrawSpec, Draws, Scope, count};
+pub(crate) use draws::{DrawKind, DrawSpec, Draws, MAX_COUNT, Scope, count, element};
 pub(crate) use stream::{Stream, StreamKind};

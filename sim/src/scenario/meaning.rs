@@ -5,15 +5,15 @@ mod fluent;
 use super::{
     Scenario, ScenarioError, nearest,
     raw::*,
-    spec::{DeedSpec, LightSpec, PlaceAt, Reference, StageSpec, ViolationSpec},
+    spec::{DeedSpec, LightSpec, ModelChoice, PlaceAt, Reference, StageSpec, ViolationSpec},
     *,
 };
 use crate::{
-    fluent as state_of,
+    derived, fluent as state_of,
     mishap::MishapKind,
     model::{ModelLibrary, ObjectModel, is_name},
     oracle,
-    random::{DrawKind, DrawSpec, StreamKind},
+    random::{DrawKind, DrawSpec, MAX_COUNT, StreamKind, element},
     robot,
 };
 use acm_concept::{
@@ -42,8 +42,10 @@ pub(super) fn parse(file: &str, text: &str) -> Result<Scenario, ScenarioError> {
 struct Meaning<'a> {
     file: &'a str,
     raw: &'a RawScenario,
-    /// Of every object, in their order.
+    /// Of every object, in their order; of several to choose from the first.
     models: Vec<Arc<ObjectModel>>,
+    /// Of the objects that have several to choose from, all of them.
+    choices: Vec<Vec<Arc<ObjectModel>>>,
     /// Draws of one value.
     scalars: Vec<String>,
     /// Draws of several values.
@@ -52,17 +54,27 @@ struct Meaning<'a> {
 
 impl<'a> Meaning<'a> {
     fn new(file: &'a str, raw: &'a RawScenario, mut library: ModelLibrary) -> Result<Self, ScenarioError> {
-        let mut meaning = Meaning { file, raw, models: Vec::new(), scalars: Vec::new(), lists: Vec::new() };
+        let mut meaning =
+            Meaning { file, raw, models: Vec::new(), choices: Vec::new(), scalars: Vec::new(), lists: Vec::new() };
         meaning.check_sizes()?;
         meaning.check_names()?;
         for object in &raw.object {
-            let model = meaning.model(object, &mut library)?;
+            let choice = meaning.choice(object, &library)?;
+            let model = match choice.first() {
+                Some(first) => first.clone(),
+                None => meaning.model(object, &mut library)?,
+            };
             meaning.models.push(model);
+            meaning.choices.push(choice);
         }
         for draw in raw.random.iter().flat_map(|random| &random.draw) {
             let (name, is_list) = draw.name_and_shape();
-            if is_list { meaning.lists.push(name.into()) } else { meaning.scalars.push(name.into()) }
+            if is_list {
+                meaning.lists.push(name.into());
+            }
+            meaning.scalars.extend(draw.scalars());
         }
+        meaning.check_scalars()?;
         Ok(meaning)
     }
 
@@ -95,6 +107,8 @@ impl<'a> Meaning<'a> {
             ("region", raw.region.len(), 0),
             ("fluent", raw.fluent.len(), 0),
             ("rule", raw.rule.len(), 0),
+            ("point", raw.point.len(), 0),
+            ("derived", raw.derived.len(), 0),
             ("fault", raw.fault.len(), 0),
             ("task.then", raw.task.then.len(), 0),
             ("model", raw.model.len(), 0),
@@ -117,8 +131,10 @@ impl<'a> Meaning<'a> {
         let places = raw.place.iter().map(|place| place.name.as_str());
         let regions = raw.region.iter().map(|region| region.name.as_str());
         let fluents = raw.fluent.iter().map(|fluent| fluent.name.as_str());
+        let points = raw.point.iter().map(|point| point.name.as_str());
+        let derived = raw.derived.iter().map(|derived| derived.name.as_str());
         let mut seen: Vec<&str> = vec!["i", "n", "e"];
-        for name in draws.chain(objects).chain(places).chain(regions).chain(fluents) {
+        for name in draws.chain(objects).chain(places).chain(regions).chain(fluents).chain(points).chain(derived) {
             if !is_name(name) {
                 let reason = "a name needs a lower-case letter first, then lower-case letters, digits, underscores";
                 return Err(self.wrong(format!("name `{name}`"), reason));
@@ -126,7 +142,7 @@ impl<'a> Meaning<'a> {
             if seen.contains(&name) {
                 return Err(self.wrong(
                     format!("name `{name}`"),
-                    "is taken; give every draw, object, place, region and fluent its own",
+                    "is taken; give every draw, object, place, region, point, fluent and derived number its own",
                 ));
             }
             seen.push(name);
@@ -192,6 +208,8 @@ impl<'a> Meaning<'a> {
             regions: raw.region.iter().map(|r| self.region(r)).collect::<Result<_, _>>()?,
             fluents: raw.fluent.iter().map(|f| self.fluent(f)).collect::<Result<_, _>>()?,
             rules: raw.rule.iter().map(|r| self.rule(r)).collect::<Result<_, _>>()?,
+            points: raw.point.iter().map(|p| self.point(p)).collect::<Result<_, _>>()?,
+            derived: (0..raw.derived.len()).map(|at| self.derived(at)).collect::<Result<_, _>>()?,
             mishaps: self.mishaps()?,
         })
     }
@@ -282,17 +300,8 @@ impl<'a> Meaning<'a> {
         let (name, _) = raw.name_and_shape();
         let field = format!("draw `{name}`");
         // Only what was drawn before can be used.
-        let before: Vec<&str> = self
-            .raw
-            .random
-            .iter()
-            .flat_map(|r| &r.draw)
-            .take(at)
-            .filter_map(|draw| {
-                let (name, is_list) = draw.name_and_shape();
-                (!is_list).then_some(name)
-            })
-            .collect();
+        let before = self.scalars_of_first(at);
+        let before = as_strs(&before);
         let number = |value: &Number| self.number(&field, value, &before);
         let repeat = |count: &Option<Number>| count.as_ref().map(&number).transpose();
         let (kind, count) = match raw {
@@ -312,26 +321,38 @@ impl<'a> Meaning<'a> {
                 (DrawKind::Choice { from: from.clone() }, repeat(count)?)
             }
             RawDraw::Permutation { of, .. } => (DrawKind::Permutation, Some(number(of)?)),
+            RawDraw::Value { is, .. } => (DrawKind::Value { is: number(is)? }, None),
         };
-        Ok(DrawSpec { name: name.into(), kind, count })
+        Ok(DrawSpec { name: name.into(), kind, count, fixed: raw.fixed_count() })
     }
 
     fn reject(&self, raw: &RawReject, draws: &[DrawSpec]) -> Result<RejectSpec, ScenarioError> {
-        let rule = match (&raw.between, raw.nearer_than_m, &raw.when) {
-            (Some(between), Some(nearer_than_m), None) => self.nearness(between, nearer_than_m)?,
-            (None, None, Some(when)) => {
-                RejectRule::When(self.expression("random.reject.when", when, &as_strs(&self.others()))?)
-            }
-            _ => return Err(self.wrong("random.reject", "needs either `between` and `nearer_than_m`, or `when`")),
-        };
-        let redraw_from = match &raw.redraw_from {
-            None => 0,
-            Some(name) => draws.iter().position(|draw| draw.name == *name).ok_or_else(|| {
+        let place_of = |field: &str, name: &String| {
+            draws.iter().position(|draw| draw.name == *name).ok_or_else(|| {
                 let names = draws.iter().map(|draw| draw.name.as_str());
-                self.wrong("random.reject.redraw_from", format!("there is no draw `{name}`{}", nearest(name, names)))
-            })?,
+                self.wrong(
+                    format!("random.reject.{field}"),
+                    format!("there is no draw `{name}`{}", nearest(name, names)),
+                )
+            })
         };
-        Ok(RejectSpec { rule, redraw_from })
+        let after = raw.after.as_ref().map(|name| place_of("after", name)).transpose()?;
+        let redraw_from = raw.redraw_from.as_ref().map_or(Ok(0), |name| place_of("redraw_from", name))?;
+        let rule = match (&raw.between, raw.nearer_than_m, &raw.when) {
+            (Some(between), Some(nearer_than_m), None) if after.is_none() => self.nearness(between, nearer_than_m)?,
+            (None, None, Some(when)) => {
+                let known = after.map_or_else(|| self.others(), |at| self.scalars_of_first(at + 1));
+                RejectRule::When(self.expression("random.reject.when", when, &as_strs(&known))?)
+            }
+            _ => {
+                let reason = "needs either `between` and `nearer_than_m`, or `when`; `after` goes with `when`";
+                return Err(self.wrong("random.reject", reason));
+            }
+        };
+        if after.is_some_and(|after| redraw_from > after) {
+            return Err(self.wrong("random.reject", "`redraw_from` is drawn only after `after`"));
+        }
+        Ok(RejectSpec { rule, redraw_from, after })
     }
 
     fn nearness(&self, between: &[String; 2], nearer_than_m: f64) -> Result<RejectRule, ScenarioError> {
@@ -373,6 +394,7 @@ impl<'a> Meaning<'a> {
         Ok(ObjectSpec {
             name: raw.name.clone(),
             model: model.clone(),
+            choice: self.model_choice(at, &names)?,
             fixed: raw.fixed.unwrap_or(model.fixed),
             starts: self.starts(&field, raw, model, &names)?,
             shows: self.shows(&field, raw, model)?,
@@ -389,6 +411,34 @@ impl<'a> Meaning<'a> {
         })
     }
 
+    /// The models of an object that has several to choose from.
+    fn choice(&self, raw: &RawObject, library: &ModelLibrary) -> Result<Vec<Arc<ObjectModel>>, ScenarioError> {
+        let field = format!("object `{}`.models", raw.name);
+        if raw.models.is_empty() != raw.which.is_none() || raw.models.len() > MAX_ITEMS {
+            return Err(self.wrong(field, format!("`models`, 1 to {MAX_ITEMS} of them, and `which` go together")));
+        }
+        if !raw.models.is_empty() && (raw.model.is_some() || raw.model_file.is_some()) {
+            return Err(self.wrong(field, "needs either `model`, or `models` and `which`, or `model_file`"));
+        }
+        let find = |name: &String| {
+            let found = library.get(name).cloned().ok_or_else(|| {
+                self.wrong(&field, format!("there is no object model `{name}`{}", nearest(name, library.names())))
+            })?;
+            if found.links.len() > 1 || found.shows().next().is_some() {
+                return Err(self.wrong(&field, format!("`{name}` has links or lamps; one to choose from has none")));
+            }
+            Ok(found)
+        };
+        raw.models.iter().map(find).collect()
+    }
+
+    fn model_choice(&self, at: usize, names: &[&str]) -> Result<Option<ModelChoice>, ScenarioError> {
+        let raw = &self.raw.object[at];
+        let Some(which) = &raw.which else { return Ok(None) };
+        let which = self.number(&format!("object `{}`.which", raw.name), which, names)?;
+        Ok(Some(ModelChoice { models: self.choices[at].clone(), which }))
+    }
+
     fn model(&self, raw: &RawObject, library: &mut ModelLibrary) -> Result<Arc<ObjectModel>, ScenarioError> {
         let field = format!("object `{}`", raw.name);
         match (&raw.model, &raw.model_file) {
@@ -401,7 +451,7 @@ impl<'a> Meaning<'a> {
                 let folder = Path::new(self.file).parent().unwrap_or(Path::new(""));
                 library.load(file, folder).map_err(|reason| self.wrong(format!("{field}.model_file"), reason))
             }
-            _ => Err(self.wrong(field, "needs either `model` or `model_file`")),
+            _ => Err(self.wrong(field, "needs either `model`, or `models` and `which`, or `model_file`")),
         }
     }
 
@@ -595,12 +645,39 @@ impl<'a> Meaning<'a> {
             self.raw.object.iter().filter(|o| o.count.is_none()).map(|object| object.name.as_str()).collect();
         let regions = self.raw.region.iter().map(|region| region.name.as_str());
         names.extend(state_of::names(regions, self.raw.fluent.iter().map(|fluent| fluent.name.as_str()), &single));
+        let points = self.raw.point.iter().map(|point| point.name.as_str());
+        names.extend(derived::names(points, self.raw.derived.iter().map(|derived| derived.name.as_str())));
         names
     }
     /// Constants that the judge can name: places and plain draws.
     fn others(&self) -> Vec<String> {
         let places = self.raw.place.iter().flat_map(|p| ["x", "y", "z"].map(|axis| format!("{}_{axis}", p.name)));
         places.chain(self.scalars.iter().cloned()).collect()
+    }
+    /// Plain draws that the first draws of the file make.
+    fn scalars_of_first(&self, draws: usize) -> Vec<String> {
+        self.raw.random.iter().flat_map(|r| &r.draw).take(draws).flat_map(RawDraw::scalars).collect()
+    }
+    /// The values of lists have names, which nothing else may have.
+    fn check_scalars(&self) -> Result<(), ScenarioError> {
+        let raw = self.raw;
+        let named = |name: &String| {
+            let twice = self.scalars.iter().filter(|scalar| *scalar == name).count() > 1;
+            twice
+                || self.lists.contains(name)
+                || raw.object.iter().any(|object| object.name == *name)
+                || raw.place.iter().any(|place| place.name == *name)
+                || raw.region.iter().any(|region| region.name == *name)
+                || raw.fluent.iter().any(|fluent| fluent.name == *name)
+                || raw.point.iter().any(|point| point.name == *name)
+                || raw.derived.iter().any(|derived| derived.name == *name)
+        };
+        match self.scalars.iter().find(|scalar| named(scalar)) {
+            Some(name) => {
+                Err(self.wrong(format!("name `{name}`"), "is that of a value in a list of draws; choose another"))
+            }
+            None => Ok(()),
+        }
     }
     fn plain_names(&self) -> Vec<&str> {
         self.scalars.iter().map(String::as_str).collect()
@@ -642,6 +719,29 @@ impl RawDraw {
             | RawDraw::Integer { name, count, .. }
             | RawDraw::Choice { name, count, .. } => (name, count.is_some()),
             RawDraw::Permutation { name, .. } => (name, true),
+            RawDraw::Value { name, .. } => (name, false),
+        }
+    }
+    /// How many values a list has, where the file says so with a plain number.
+    fn fixed_count(&self) -> Option<usize> {
+        let count = match self {
+            RawDraw::Uniform { count, .. }
+            | RawDraw::Normal { count, .. }
+            | RawDraw::Integer { count, .. }
+            | RawDraw::Choice { count, .. } => count.as_ref()?,
+            RawDraw::Permutation { of, .. } => of,
+            RawDraw::Value { .. } => return None,
+        };
+        match count {
+            Number::Plain(count) if (0.0..=MAX_COUNT as f64).contains(count) => Some(*count as usize),
+            _ => None,
+        }
+    }
+    /// Names of its plain values.
+    fn scalars(&self) -> Vec<String> {
+        match self.name_and_shape() {
+            (name, false) => vec![name.into()],
+            (name, true) => (0..self.fixed_count().unwrap_or(0)).map(|place| element(name, place)).collect(),
         }
     }
 }

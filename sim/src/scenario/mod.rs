@@ -103,12 +103,20 @@ pub enum ScenarioError {
 }
 
 impl Scenario {
-    /// Names of the scenarios that ship with the simulator, sorted.
+    /// Names of the scenarios that ship with the simulator, sorted; those of suites are not among them.
     pub fn names() -> Vec<String> {
-        let stem = |path: &Path| Some(path.file_stem()?.to_str()?.to_string());
-        let mut names: Vec<String> = EMBEDDED.files().filter_map(|file| stem(file.path())).collect();
-        names.sort();
-        names
+        names_in(&EMBEDDED)
+    }
+
+    /// Names of the suites that ship with the simulator: scenarios that belong together, each in a folder of its own.
+    pub fn suites() -> Vec<String> {
+        let folders = EMBEDDED.dirs().filter_map(|folder| folder.path().to_str());
+        folders.filter(|folder| *folder != MODELS).map(str::to_owned).collect()
+    }
+
+    /// Names of a suite's scenarios, sorted; none if there is no such suite. They are opened by these names alone.
+    pub fn suite(name: &str) -> Vec<String> {
+        EMBEDDED.get_dir(name).filter(|_| name != MODELS).map(names_in).unwrap_or_default()
     }
 
     /// Opens a scenario: a file if there is one of that path, else the embedded scenario of that name.
@@ -134,7 +142,9 @@ impl Scenario {
             return Scenario::parse_with(name_or_path, &std::fs::read_to_string(path).map_err(read)?, settings);
         }
         let file = format!("{name_or_path}.toml");
-        match EMBEDDED.get_file(&file).and_then(|file| file.contents_utf8()) {
+        let in_suites = Scenario::suites().into_iter().map(|suite| format!("{suite}/{file}"));
+        let mut found = std::iter::once(file.clone()).chain(in_suites).filter_map(|path| EMBEDDED.get_file(path));
+        match found.next().and_then(|file| file.contents_utf8()) {
             Some(text) => Scenario::parse_with(&file, text, settings),
             None => Err(unknown(name_or_path)),
         }
@@ -187,12 +197,23 @@ impl Scenario {
     }
 }
 
+/// The folder of object models, which is no suite.
+const MODELS: &str = "objects";
+
+fn names_in(folder: &Dir<'_>) -> Vec<String> {
+    let stem = |path: &Path| Some(path.file_stem()?.to_str()?.to_string());
+    let mut names: Vec<String> = folder.files().filter_map(|file| stem(file.path())).collect();
+    names.sort();
+    names
+}
+
 fn too_large(file: &str) -> ScenarioError {
     ScenarioError::Format { file: file.into(), reason: format!("larger than {MAX_SCENARIO_BYTES} bytes") }
 }
 
 fn unknown(name: &str) -> ScenarioError {
-    let known = Scenario::names();
+    let of_suites = Scenario::suites().into_iter().flat_map(|suite| Scenario::suite(&suite));
+    let known: Vec<String> = Scenario::names().into_iter().chain(of_suites).collect();
     let suggestion = nearest(name, known.iter().map(String::as_str));
     ScenarioError::Unknown { name: name.into(), suggestion, known: known.join(", ") }
 }

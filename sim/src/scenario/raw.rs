@@ -3,7 +3,7 @@
 
 mod fluent;
 
-pub(crate) use fluent::{RawFluent, RawRegion, RawRule};
+pub(crate) use fluent::{RawDerived, RawFluent, RawPoint, RawRegion, RawRule};
 
 use crate::{mishap::MishapKind, model::RawModel, random::StreamKind};
 use schemars::JsonSchema;
@@ -91,6 +91,12 @@ pub(crate) struct RawScenario {
     /// What changes fluents.
     #[serde(default)]
     pub(crate) rule: Vec<RawRule>,
+    /// Points that move with objects: `NAME_x`, `NAME_y`, `NAME_z` are variables of the judge.
+    #[serde(default)]
+    pub(crate) point: Vec<RawPoint>,
+    /// Numbers that follow from the judge's variables, under names of their own.
+    #[serde(default)]
+    pub(crate) derived: Vec<RawDerived>,
     /// What goes wrong in every episode.
     #[serde(default)]
     pub(crate) fault: Vec<RawFault>,
@@ -304,7 +310,8 @@ pub(crate) struct RawRandom {
     pub(crate) reject: Vec<RawReject>,
 }
 
-/// A named draw.
+/// A named draw. Where `count`, or a permutation's `of`, is a plain number, the single values are plain draws too, under
+/// `NAME_0`, `NAME_1` and so on.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, tag = "kind", rename_all = "kebab-case")]
 pub(crate) enum RawDraw {
@@ -363,6 +370,13 @@ pub(crate) enum RawDraw {
         /// How many.
         of: Number,
     },
+    /// No draw, but a number that follows from the draws before it.
+    Value {
+        /// Name.
+        name: String,
+        /// Expression over plain draws before it.
+        is: Number,
+    },
 }
 
 /// Layouts in which two things are too near each other, or in which a condition holds, are drawn anew.
@@ -381,6 +395,11 @@ pub(crate) struct RawReject {
     /// The draw from which on all is drawn anew. Default: the first.
     #[serde(default)]
     pub(crate) redraw_from: Option<String>,
+    /// The draw after which `when` is looked at, before the next draw is made; it can then use the plain draws up to that
+    /// one, and no places. So the loops of another program that draws until something fits are met number by number.
+    /// Default: after the whole layout.
+    #[serde(default)]
+    pub(crate) after: Option<String>,
 }
 
 /// An object, or several alike.
@@ -389,9 +408,15 @@ pub(crate) struct RawReject {
 pub(crate) struct RawObject {
     /// Name: lower-case letters, digits and underscores, a letter first.
     pub(crate) name: String,
-    /// Its model: one that ships with the simulator, or one of this file. Either this or `model_file`.
+    /// Its model: one that ships with the simulator, or one of this file. Either this, `models` or `model_file`.
     #[serde(default)]
     pub(crate) model: Option<String>,
+    /// Several models, of which each episode takes the one with the number `which`. They have neither joints nor lamps.
+    #[serde(default)]
+    pub(crate) models: Vec<String>,
+    /// Number of the model in `models`, from 0: an expression over draws.
+    #[serde(default)]
+    pub(crate) which: Option<Number>,
     /// A URDF or MJCF file instead: a path relative to this file, or `data:` and a path below the folder that the
     /// variable `ACM_DATA` names. `#BODY` after an MJCF file takes one of its bodies.
     #[serde(default)]
@@ -546,15 +571,17 @@ pub(crate) struct RawFault {
 /// How the outcome is judged, over the world's true state after every physics step.
 ///
 /// Variables: for every object without `count`: `NAME_x`, `NAME_y`, `NAME_z` (base frame, metres), `NAME_speed`
-/// (m/s), `NAME_spin` (rad/s), `NAME_tilt` (rad from upright), `NAME_moved` (metres from its start), `NAME_turned`
+/// (m/s), `NAME_spin` (rad/s), `NAME_tilt` (rad from upright), `NAME_yaw` (rad, the turn about z that is left when the tilt is
+/// undone), `NAME_moved` (metres from its start), `NAME_turned`
 /// (rad from its first heading), `NAME_touched` (pads in contact with it); for each of its joints `NAME_JOINT`
 /// (position, rad or m), `NAME_JOINT_speed`, `NAME_JOINT_open` (0 closed to 1 wide open; 0 for one that turns without
 /// end), with a latch `NAME_JOINT_latched` (1 or 0), with a press counter `NAME_JOINT_pressed` (1 or 0) and
 /// `NAME_JOINT_presses` (count); of its first press counter also `NAME_pressed`, `NAME_presses`, `NAME_depth`;
-/// `PLACE_x`, `PLACE_y`, `PLACE_z`; `REGION_has_NAME`, `REGION_count`; fluents under their names; `others_moved`
+/// `PLACE_x`, `PLACE_y`, `PLACE_z`; `REGION_has_NAME`, `REGION_count`; `POINT_x`, `POINT_y`, `POINT_z`; fluents and derived numbers
+/// under their names; `others_moved`
 /// (metres, the most that any object not listed in `moves` has
 /// moved); `commanded_opening` (share of the largest), `pad_contact` (pads in contact with anything, 0-2), `tcp_x`,
-/// `tcp_y`, `tcp_z`, `time` (seconds); plain draws under their names.
+/// `tcp_y`, `tcp_z`, `hands_moved` (metres, the most that a hand is away from where it began), `time` (seconds); plain draws under their names.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct RawJudge {

@@ -33,6 +33,8 @@ pub(crate) struct WorldSpec {
     pub(crate) regions: Vec<RegionSpec>,
     pub(crate) fluents: Vec<FluentSpec>,
     pub(crate) rules: Vec<RuleSpec>,
+    pub(crate) points: Vec<PointSpec>,
+    pub(crate) derived: Vec<DerivedSpec>,
     pub(crate) mishaps: Vec<(MishapKind, u32)>,
 }
 
@@ -70,6 +72,21 @@ pub(crate) struct RuleSpec {
     pub(crate) set: Vec<(usize, Expression)>,
 }
 
+/// A point that moves with an object.
+#[derive(Debug, Clone)]
+pub(crate) struct PointSpec {
+    pub(crate) name: String,
+    pub(crate) of: Reference,
+    pub(crate) at: [Expression; 3],
+}
+
+/// A number that follows from other variables.
+#[derive(Debug, Clone)]
+pub(crate) struct DerivedSpec {
+    pub(crate) name: String,
+    pub(crate) is: Expression,
+}
+
 #[derive(Debug, Clone)]
 pub(crate) struct SurfaceSpec {
     pub(crate) name: String,
@@ -103,6 +120,8 @@ pub(crate) struct RejectSpec {
     pub(crate) rule: RejectRule,
     /// Index of the first draw that is drawn anew.
     pub(crate) redraw_from: usize,
+    /// Index of the draw after which it looks at once; `None` for after the whole layout.
+    pub(crate) after: Option<usize>,
 }
 
 /// What makes a layout unusable.
@@ -116,6 +135,8 @@ pub(crate) enum RejectRule {
 pub(crate) struct ObjectSpec {
     pub(crate) name: String,
     pub(crate) model: Arc<ObjectModel>,
+    /// Of several models, which one it is made from, from 0.
+    pub(crate) choice: Option<ModelChoice>,
     pub(crate) fixed: bool,
     /// Links, and where their joints start.
     pub(crate) starts: Vec<(usize, Expression)>,
@@ -131,6 +152,13 @@ pub(crate) struct ObjectSpec {
     pub(crate) density_kg_m3: Option<Expression>,
     pub(crate) friction: Option<Expression>,
     pub(crate) perturb: Option<RawPerturb>,
+}
+
+/// Models of one object, of which each episode chooses one. None of them has joints or lamps.
+#[derive(Debug, Clone)]
+pub(crate) struct ModelChoice {
+    pub(crate) models: Vec<Arc<ObjectModel>>,
+    pub(crate) which: Expression,
 }
 
 /// A copy of an object; the index is `None` for one that has no copies.

@@ -1,4 +1,4 @@
-//! The meaning of regions, fluents and rules.
+//! The meaning of regions, fluents, rules, points and derived numbers.
 
 use super::{super::spec::*, Meaning, as_strs};
 use crate::scenario::{ScenarioError, nearest, raw::*};
@@ -51,5 +51,21 @@ impl Meaning<'_> {
             when: self.expression(&format!("{field}.when"), &raw.when, &as_strs(&variables))?,
             set: raw.set.iter().map(set).collect::<Result<_, _>>()?,
         })
+    }
+
+    pub(super) fn point(&self, raw: &RawPoint) -> Result<PointSpec, ScenarioError> {
+        let field = format!("point `{}`", raw.name);
+        let at = self.triple(&format!("{field}.at"), &raw.at, &as_strs(&self.others()))?;
+        Ok(PointSpec { name: raw.name.clone(), of: self.reference(&field, &raw.of)?, at })
+    }
+
+    /// A derived number can use those before it.
+    pub(super) fn derived(&self, at: usize) -> Result<DerivedSpec, ScenarioError> {
+        let raw = &self.raw.derived[at];
+        let later: Vec<&str> = self.raw.derived[at..].iter().map(|derived| derived.name.as_str()).collect();
+        let variables = self.variables();
+        let known: Vec<&str> = variables.iter().map(String::as_str).filter(|name| !later.contains(name)).collect();
+        let is = self.number(&format!("derived `{}`", raw.name), &raw.is, &known)?;
+        Ok(DerivedSpec { name: raw.name.clone(), is })
     }
 }

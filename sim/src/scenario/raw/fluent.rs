@@ -55,6 +55,29 @@ pub(crate) struct RawRule {
     pub(crate) set: BTreeMap<String, Number>,
 }
 
+/// A point that moves with an object, such as the end of a battery. Where it is are variables of the judge, of events and of
+/// rules: `NAME_x`, `NAME_y`, `NAME_z`, metres.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct RawPoint {
+    /// Name: lower-case letters, digits and underscores, a letter first.
+    pub(crate) name: String,
+    /// The object.
+    pub(crate) of: RawReference,
+    /// The point in the object's base frame, metres. Expressions can use places and plain draws.
+    pub(crate) at: [Number; 3],
+}
+
+/// A number that follows from others: a condition or a distance that several predicates share.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct RawDerived {
+    /// Name: lower-case letters, digits and underscores, a letter first.
+    pub(crate) name: String,
+    /// Expression over the judge's variables and the derived numbers before it.
+    pub(crate) is: Number,
+}
+
 fn zero() -> Number {
     Number::Plain(0.0)
 }
