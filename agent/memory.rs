@@ -3,6 +3,7 @@
 //! | module | holds |
 //! |---|---|
 //! | [`ask`] | words of the command line as a query; hits and explanations as text |
+//! | [`skills`] | what skills rest on |
 //! | [`past`] | histories, and everything as of a moment |
 //! | [`export`] | JSON lines, SQL, PDDL, spark_dsg |
 //! | [`picture`] | the scene graph as SVG |
@@ -11,6 +12,7 @@ pub mod ask;
 pub mod export;
 pub mod past;
 pub mod picture;
+pub mod skills;
 
 use crate::cli::{
     Exit,
@@ -30,6 +32,7 @@ pub fn run(command: &MemoryCommand) -> anyhow::Result<Exit> {
         MemoryCommand::Query(args) => ask::query(args)?,
         MemoryCommand::Explain(args) => ask::explain(args)?,
         MemoryCommand::History { dir, object, json } => past::history(dir, object, *json)?,
+        MemoryCommand::Skills { dir, skill, json } => skills::print(dir, skill.as_deref(), *json)?,
         MemoryCommand::At(args) => past::at(args)?,
         MemoryCommand::Forget(args) => forget(args)?,
         MemoryCommand::Verify { dir } => verify(dir)?,

@@ -28,6 +28,17 @@ pub enum MemoryCommand {
         #[arg(long)]
         json: bool,
     },
+    /// Say what each skill rests on: executions, conditions, and how its parameters follow from geometry.
+    Skills {
+        /// The folder.
+        dir: PathBuf,
+        /// Only this one, such as S2.
+        #[arg(long, value_name = "SKILL")]
+        skill: Option<String>,
+        /// Print JSON instead of text.
+        #[arg(long)]
+        json: bool,
+    },
     /// Tell how everything was at a moment, as it was known at another.
     At(AtArgs),
     /// Forget objects, regions or sources so that no byte of them stays in the folder.

@@ -189,8 +189,106 @@ pub struct SkillEntry {
     pub tries: u32,
     /// Verified successes so far.
     pub successes: u32,
-    /// The transitions it rests on.
+    /// The verified transitions it rests on.
     pub transitions: Vec<TransitionId>,
+    /// The failed transitions that count against it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub failures: Vec<TransitionId>,
+    /// What subtasks that are done have taught beyond statistics; `None` before the first.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub general: Option<Box<General>>,
+}
+
+impl SkillEntry {
+    /// A bound parameter for a part with these geometric parameters: by its law where it has one, else its mean.
+    /// With the standard deviation of what is left, where one is known. `None` for a name that was never bound.
+    ///
+    /// ```
+    /// # use acm_memory::entry::{General, Law, LawTerm, SkillEntry};
+    /// let term = LawTerm { parameter: "width".into(), slope: 1.0 };
+    /// let law = Law { name: "radius".into(), terms: vec![term], constant: -0.05, residual: 0.002, count: 9 };
+    /// let mut entry: SkillEntry = serde_json::from_str(
+    ///     r#"{"id":"S1","skill":"open","template":"door-left","kind":"hinge-open","preconditions":[],
+    ///         "parameters":[["radius",0.4]],"tries":9,"successes":9,"transitions":[]}"#).unwrap();
+    /// assert_eq!(entry.bound("radius", &|_| Some(0.6)), Some((0.4, None)));
+    /// entry.general = Some(Box::new(General { laws: vec![law], ..General::default() }));
+    /// let (radius, residual) = entry.bound("radius", &|name| (name == "width").then_some(0.6)).unwrap();
+    /// assert!((radius - 0.55).abs() < 1e-12 && residual == Some(0.002));
+    /// ```
+    pub fn bound(&self, name: &str, value_of: &dyn Fn(&str) -> Option<f64>) -> Option<(f64, Option<f64>)> {
+        let law = self.general.iter().flat_map(|general| &general.laws).find(|law| law.name == name);
+        let by_law = law.and_then(|law| {
+            let mut sum = law.constant;
+            for term in &law.terms {
+                sum += term.slope * value_of(&term.parameter)?;
+            }
+            Some((sum, Some(law.residual)))
+        });
+        let mean = || self.parameters.iter().find(|(known, _)| known == name).map(|(_, mean)| (*mean, None));
+        by_law.or_else(mean)
+    }
+}
+
+/// What verified executions of one skill on parts of one template have in common.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct General {
+    /// The parts on which it succeeded.
+    pub target: TargetSchema,
+    /// Conditions that nobody declared: they held in every success, and tries without them failed.
+    pub learned: Vec<LearnedCondition>,
+    /// Tries in which no learned condition was known not to hold, and how many of these succeeded.
+    pub sound: (u32, u32),
+    /// How bound parameters follow from the part's geometry, where that tells more than their mean.
+    pub laws: Vec<Law>,
+}
+
+/// Target schema: what the parts had in common on which a skill succeeded.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct TargetSchema {
+    /// Categories of their objects, in order.
+    pub categories: Vec<String>,
+    /// Affordances that all of them had, in order.
+    pub affordances: Vec<String>,
+    /// Least and greatest value of each geometric parameter, in the template's units.
+    pub parameters: Vec<(String, f64, f64)>,
+}
+
+/// A condition read out of successes and failures, over `?self`, `?object` (where the part is not the whole object) and
+/// `?support`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LearnedCondition {
+    /// The condition.
+    pub literal: Literal,
+    /// Successes before which it was believed to hold. It was believed not to hold before none.
+    pub successes: u32,
+    /// Failures before which it was believed to hold.
+    pub failures_with: u32,
+    /// Failures before which it was believed not to hold.
+    pub failures_without: u32,
+}
+
+/// A bound parameter as a linear function of geometric parameters of the part.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Law {
+    /// The bound parameter.
+    pub name: String,
+    /// One or two terms.
+    pub terms: Vec<LawTerm>,
+    /// What is added to them.
+    pub constant: f64,
+    /// Standard deviation of what the law leaves open, in the bound parameter's unit.
+    pub residual: f64,
+    /// Verified executions that it was fitted to.
+    pub count: u32,
+}
+
+/// A term of a [`Law`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LawTerm {
+    /// A geometric parameter of the template.
+    pub parameter: String,
+    /// Its factor.
+    pub slope: f64,
 }
 
 /// Where the agent is in its instruction. It lives in memory so that a wiped memory forgets it.

@@ -80,8 +80,15 @@ pub enum Change {
         /// State literals after it.
         after: Vec<Literal>,
     },
-    /// A skill entry as it is from now on.
+    /// A skill entry as it is from now on; one without tries is dropped.
     Skill(Box<SkillEntry>),
+    /// Skills must not rest on these transitions, or may again.
+    TakenBack {
+        /// The transitions.
+        transitions: Vec<TransitionId>,
+        /// Whether they may be rested on again.
+        restored: bool,
+    },
     /// Some of memory was dropped.
     Forgotten(Forget),
     /// Everything dynamic was dropped; ids go on where they were, so that none is ever given twice.

@@ -1,14 +1,15 @@
 //! Takes what the robot did: transitions, the beliefs that they bring, and what the verifier made of them.
 
 use crate::{
-    belief,
+    belief, consolidate,
     draft::{Draft, Stage},
     entry::{ObjectEntry, PlaceCause, Presence, Transition, TransitionResult},
     event::Change,
     identity::predict::{HAND_SIGMA_M, carried},
     observation::{Executed, Outcome, Verdict},
     observe::lose_grip,
-    scene, skill,
+    scene,
+    state::State,
 };
 use acm_concept::{
     ids::{ObjectId, TransitionId},
@@ -19,6 +20,8 @@ use glam::DVec3;
 
 /// Felt literals below this confidence are not taken as felt.
 const FELT: f64 = 0.5;
+/// Most literals that are asked of an object because an action once felt them.
+const MAX_FOUND: usize = 32;
 
 /// Keeps a finished skill and applies what the robot felt as beliefs that have yet to be verified.
 pub(crate) fn record(draft: &mut Draft<'_>, executed: &Executed) -> TransitionId {
@@ -47,7 +50,9 @@ pub(crate) fn record(draft: &mut Draft<'_>, executed: &Executed) -> TransitionId
 /// What is believed before of all that the skill's conditions and predicted effects speak of.
 fn state_before(draft: &Draft<'_>, executed: &Executed) -> Vec<Literal> {
     let object = executed.report.invocation.part.object;
-    let mut about: Vec<Literal> = executed.predicted.iter().map(|l| Literal { negated: false, ..l.clone() }).collect();
+    let mut about: Vec<Literal> = executed.predicted.iter().map(positive).collect();
+    about.extend(draft.state.object(object).into_iter().flat_map(|entry| entry.state.iter()).map(positive));
+    about.extend(found_of(&draft.state, object));
     about.push(Literal::new("hand-empty", Vec::new()));
     about.push(Literal::new("clear", vec![Term::Object(object)]));
     if let Some(support) = draft.state.object(object).and_then(|entry| entry.support) {
@@ -65,6 +70,24 @@ fn state_before(draft: &Draft<'_>, executed: &Executed) -> Vec<Literal> {
         }
     }
     before
+}
+
+fn positive(literal: &Literal) -> Literal {
+    Literal { negated: false, ..literal.clone() }
+}
+
+/// What own actions of this run felt or found of the object itself, latest first.
+fn found_of(state: &State, object: ObjectId) -> Vec<Literal> {
+    let mut found: Vec<Literal> = Vec::new();
+    let own = state.transitions.iter().rev().take_while(|t| t.moment.episode == state.next.episode);
+    let literals = own.flat_map(|t| t.report.felt.iter().map(|(literal, _)| literal).chain(&t.after));
+    for literal in literals.filter(|literal| literal.arguments.len() == 1 && literal.subject() == Some(object)) {
+        let literal = positive(literal);
+        if found.len() < MAX_FOUND && !found.contains(&literal) {
+            found.push(literal);
+        }
+    }
+    found
 }
 
 fn apply_report(draft: &Draft<'_>, stage: &mut Stage, report: &SkillReport, id: TransitionId) {
@@ -179,9 +202,7 @@ pub(crate) fn settle(draft: &mut Draft<'_>, transition: &Transition, verdict: &V
         }
     }
     draft.emit_stage(stage, &evidence);
-    if let Some(entry) = skill::consolidated(&draft.state, draft.library, transition) {
-        draft.emit(evidence.to_vec(), Change::Skill(Box::new(entry)));
-    }
+    consolidate::count(draft, transition);
 }
 
 fn result(transition: &Transition, verdict: &Verdict) -> TransitionResult {

@@ -18,6 +18,7 @@
 //! [`default_library`], [`library_of`] some groups or [`library_from_dir`].
 
 mod belief;
+mod consolidate;
 mod draft;
 pub mod entry;
 pub mod event;

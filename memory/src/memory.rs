@@ -1,6 +1,7 @@
 //! The memory itself: decides what each call changes, commits it as one batch, and hands out snapshots.
 
 use crate::{
+    consolidate,
     draft::Draft,
     event::{Change, Counters, Event, Forget, Source},
     execute, expect,
@@ -15,7 +16,7 @@ use crate::{
 };
 use acm_concept::{
     expectation::Expectation,
-    ids::{ObjectId, TransitionId},
+    ids::{ObjectId, SkillId, TransitionId},
     template::TemplateLibrary,
     time::Time,
 };
@@ -66,6 +67,33 @@ impl AcmMemory {
         draft.emit(Vec::new(), Change::Forgotten(forget.clone()));
         let (state, events, fault) = (draft.state, draft.events, draft.fault);
         self.commit(state, events, fault)
+    }
+    /// Takes transitions back out of skill memory, or, `restored`, in again: every skill is then what it would be without
+    /// them. What was executed stays in transition memory.
+    ///
+    /// # Errors
+    /// One of them is not remembered; then nothing changes.
+    pub fn take_back(&mut self, transitions: &[TransitionId], restored: bool) -> Result<(), MemoryError> {
+        if let Some(unknown) = transitions.iter().find(|id| self.state.transition(**id).is_none()) {
+            return Err(MemoryError::UnknownTransition(*unknown));
+        }
+        let mut draft = self.draft(Source::Agent);
+        consolidate::take_back(&mut draft, transitions, restored);
+        let (state, events, fault) = (draft.state, draft.events, draft.fault);
+        self.commit(state, events, fault)
+    }
+    /// Undoes a skill's latest consolidation: takes back what its latest subtask brought, and says which transitions
+    /// those were. A skill that came with them goes with them.
+    ///
+    /// # Errors
+    /// There is no such skill.
+    pub fn undo_consolidation(&mut self, skill: SkillId) -> Result<Vec<TransitionId>, MemoryError> {
+        if !self.state.skills.iter().any(|entry| entry.id == skill) {
+            return Err(MemoryError::UnknownSkill(skill));
+        }
+        let latest = consolidate::latest(&self.state, skill);
+        self.take_back(&latest, false)?;
+        Ok(latest)
     }
     /// Forgets objects and what was done to them so that no byte of them stays in the folder. What skills learned from
     /// them stays, as numbers without a link; so do words of the instruction.
@@ -211,6 +239,7 @@ impl Memory for AcmMemory {
             Note::SubtaskDone { time, index } => {
                 draft.at(*time);
                 draft.emit(Vec::new(), Change::SubtaskDone { index: *index });
+                consolidate::after_subtask(&mut draft, *index);
             }
         }
         let (state, events, fault) = (draft.state, draft.events, draft.fault);

@@ -91,8 +91,10 @@ pub(crate) fn event(mut event: Event, dropped: &mut Dropped<'_>) -> Option<Event
             }
             dropped.literals(after);
         }
+        Change::TakenBack { transitions, .. } => transitions.retain(|id| !dropped.transitions.contains(id)),
         Change::Skill(skill) => {
             skill.transitions.retain(|id| !dropped.transitions.contains(id));
+            skill.failures.retain(|id| !dropped.transitions.contains(id));
             skill.preconditions.retain(|literal| {
                 !literal.arguments.iter().any(|term| match term {
                     Term::Object(id) => dropped.has(*id),

@@ -1,16 +1,16 @@
 //! Skill memory: which manipulation functions fit an object, what came of them, what they are expected to do.
 
 use crate::{
-    entry::{SkillEntry, Transition, TransitionResult},
+    belief,
+    entry::SkillEntry,
     query::{Prediction, SkillCandidate},
     state::State,
 };
 use acm_concept::{
-    ids::{ObjectId, PartId, SkillId},
-    literal::{Literal, Place, Term},
+    ids::{ObjectId, PartId},
+    literal::{Literal, Place, Term, Truth},
     template::{FunctionBinding, TemplateLibrary},
 };
-use std::collections::BTreeMap;
 
 /// The functions that the object's templates bind, instantiated on its parts; best expected success first. Those
 /// that need a destination are left out where none is given.
@@ -32,6 +32,7 @@ pub(crate) fn candidates(
         let bind = |name: &str| match name {
             "self" if index == 0 => Some(Term::Object(object)),
             "self" => Some(Term::Part(part_id)),
+            "object" => Some(Term::Object(object)),
             "support" => entry.support.map(Term::Object),
             "destination" => destination.map(Term::Place),
             _ => None,
@@ -44,14 +45,15 @@ pub(crate) fn candidates(
             if !preconditions.iter().chain(&effects).all(Literal::is_ground) {
                 continue;
             }
-            let (tries, successes) = statistics(state, &function.name, &template.name);
+            let known = find(state, &function.name, &template.name);
+            let (tries, successes) = known.map_or((0, 0), |entry| statistics(state, library, entry, &bind));
             candidates.push(SkillCandidate {
                 skill: function.name.clone(),
                 template: template.name.clone(),
                 kind: function.kind.clone(),
                 part: part_id,
                 destination: destination.filter(|_| needs_destination(function)),
-                entry: find(state, &function.name, &template.name).map(|entry| entry.id),
+                entry: known.map(|entry| entry.id),
                 preconditions,
                 effects,
                 success: smoothed(tries, successes),
@@ -68,9 +70,19 @@ fn needs_destination(function: &FunctionBinding) -> bool {
     function.preconditions.iter().chain(&function.effects).any(|literal| literal.arguments.iter().any(is_destination))
 }
 
-/// Declared effects with the probability that this skill on this template has had so far.
-pub(crate) fn predict(state: &State, candidate: &SkillCandidate) -> Prediction {
-    let (tries, successes) = statistics(state, &candidate.skill, &candidate.template);
+/// Declared effects with the probability that this skill on this template has had so far, under the conditions that
+/// were learned for it.
+pub(crate) fn predict(state: &State, library: &TemplateLibrary, candidate: &SkillCandidate) -> Prediction {
+    let part = candidate.part;
+    let bind = |name: &str| match name {
+        "self" if part.index == 0 => Some(Term::Object(part.object)),
+        "self" => Some(Term::Part(part)),
+        "object" => Some(Term::Object(part.object)),
+        "support" => state.object(part.object).and_then(|entry| entry.support).map(Term::Object),
+        _ => None,
+    };
+    let known = find(state, &candidate.skill, &candidate.template);
+    let (tries, successes) = known.map_or((0, 0), |entry| statistics(state, library, entry, &bind));
     let success = smoothed(tries, successes);
     let effects = candidate.effects.iter().map(|effect| (effect.clone(), success)).collect();
     Prediction { effects, success, tries, successes }
@@ -81,50 +93,34 @@ fn smoothed(tries: u32, successes: u32) -> f64 {
     (f64::from(successes) + 1.0) / (f64::from(tries) + 2.0)
 }
 
-fn find<'s>(state: &'s State, skill: &str, template: &str) -> Option<&'s SkillEntry> {
+pub(crate) fn find<'s>(state: &'s State, skill: &str, template: &str) -> Option<&'s SkillEntry> {
     state.skills.iter().find(|entry| entry.skill == skill && entry.template == template)
 }
 
-fn statistics(state: &State, skill: &str, template: &str) -> (u32, u32) {
-    find(state, skill, template).map_or((0, 0), |entry| (entry.tries, entry.successes))
-}
-
-/// The skill entry that a settled transition belongs to, computed anew from all settled transitions of its skill
-/// and template, so that a verdict that is revised is never counted twice. `None` while nothing is decided.
-pub(crate) fn consolidated(state: &State, library: &TemplateLibrary, transition: &Transition) -> Option<SkillEntry> {
-    let (skill, template) = (transition.skill(), &transition.report.invocation.target.template);
-    let same = |other: &&Transition| other.skill() == skill && other.report.invocation.target.template == *template;
-    let (mut tries, mut links) = (0u32, Vec::new());
-    let mut sums: BTreeMap<&str, (f64, u32)> = BTreeMap::new();
-    for other in state.transitions.iter().filter(same) {
-        match other.result {
-            TransitionResult::Verified => {
-                let report = &other.report;
-                for (name, value) in report.invocation.arguments.iter().chain(&report.measured) {
-                    let (sum, count) = sums.entry(name).or_insert((0.0, 0));
-                    (*sum, *count) = (*sum + value, *count + 1);
-                }
-                links.push(other.id);
-            }
-            TransitionResult::Failed { .. } => {}
-            TransitionResult::Pending | TransitionResult::CannotTell => continue,
+/// Tries and successes that are like what is asked: where a learned condition is believed not to hold, the tries without
+/// it; where all are believed to hold, the tries that violated none; else all.
+fn statistics(
+    state: &State,
+    library: &TemplateLibrary,
+    entry: &SkillEntry,
+    bind: &dyn Fn(&str) -> Option<Term>,
+) -> (u32, u32) {
+    let Some(general) = entry.general.as_ref().filter(|general| !general.learned.is_empty()) else {
+        return (entry.tries, entry.successes);
+    };
+    let mut all_hold = true;
+    for condition in &general.learned {
+        let literal = condition.literal.substitute(bind);
+        let truth = if literal.is_ground() {
+            belief::belief(state, library, &literal).truth
+        } else {
+            Truth::Unknown
+        };
+        match truth {
+            Truth::No => return (condition.failures_without, 0),
+            Truth::Unknown => all_hold = false,
+            Truth::Yes => {}
         }
-        tries += 1;
     }
-    let known = find(state, skill, template);
-    if tries == 0 && known.is_none() {
-        return None;
-    }
-    let function = library.get(template).and_then(|template| template.function(skill));
-    Some(SkillEntry {
-        id: known.map_or(SkillId(state.next.skill), |entry| entry.id),
-        skill: skill.into(),
-        template: template.clone(),
-        kind: transition.report.invocation.kind.clone(),
-        preconditions: function.map(|function| function.preconditions.clone()).unwrap_or_default(),
-        parameters: sums.into_iter().map(|(name, (sum, count))| (name.into(), sum / f64::from(count))).collect(),
-        tries,
-        successes: u32::try_from(links.len()).unwrap_or(u32::MAX),
-        transitions: links,
-    })
+    if all_hold { general.sound } else { (entry.tries, entry.successes) }
 }

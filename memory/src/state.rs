@@ -10,7 +10,10 @@ use acm_concept::{
     object::SupportPlane,
     time::Time,
 };
-use std::{collections::BTreeMap, sync::Arc};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    sync::Arc,
+};
 
 /// Most objects that are kept; later newcomers are not registered.
 pub const MAX_OBJECTS: usize = 100_000;
@@ -29,6 +32,8 @@ pub struct State {
     pub(crate) tracks: Arc<BTreeMap<ObjectId, Track>>,
     pub(crate) transitions: Arc<Vec<Transition>>,
     pub(crate) skills: Arc<Vec<SkillEntry>>,
+    /// Transitions on which no skill may rest.
+    pub(crate) taken_back: Arc<BTreeSet<TransitionId>>,
     pub(crate) progress: TaskProgress,
     pub(crate) support: Option<SupportPlane>,
     pub(crate) frames_seen: u32,
@@ -87,6 +92,12 @@ impl State {
                 (entry.result, entry.after) = (result.clone(), after.clone());
             }
             Change::Skill(skill) => self.put_skill(skill),
+            Change::TakenBack { transitions, restored } => {
+                let all = Arc::make_mut(&mut self.taken_back);
+                for transition in transitions {
+                    if *restored { all.remove(transition) } else { all.insert(*transition) };
+                }
+            }
             Change::Forgotten(forget) => self.forget(forget),
             Change::Wiped(counters) => {
                 *self = State { next: *counters, now: event.moment.time, ..State::default() };
@@ -170,6 +181,11 @@ impl State {
     fn put_skill(&mut self, skill: &SkillEntry) {
         let skills = Arc::make_mut(&mut self.skills);
         let full = skills.len() >= MAX_SKILLS;
+        if skill.tries == 0 {
+            skills.retain(|entry| entry.id != skill.id);
+            self.next.skill = self.next.skill.max(skill.id.0 + 1);
+            return;
+        }
         match skills.iter_mut().find(|entry| entry.id == skill.id) {
             Some(entry) => *entry = skill.clone(),
             None if full => {}

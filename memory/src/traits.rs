@@ -10,7 +10,7 @@ use crate::{
 };
 use acm_concept::{
     expectation::Expectation,
-    ids::{ObjectId, PartId, TransitionId},
+    ids::{ObjectId, PartId, SkillId, TransitionId},
     literal::{Belief, Literal, Place},
     object::SupportPlane,
     template::TemplateLibrary,
@@ -70,6 +70,9 @@ pub enum MemoryError {
     /// A transition that memory does not know.
     #[error("there is no transition {0}")]
     UnknownTransition(TransitionId),
+    /// A skill that memory does not know.
+    #[error("there is no skill {0}")]
+    UnknownSkill(SkillId),
 }
 
 /// A memory that an agent writes to. One writer; readers take views.

@@ -74,7 +74,7 @@ impl MemoryView for Snapshot {
         skill::candidates(&self.state, &self.library, object, destination)
     }
     fn predict(&self, candidate: &SkillCandidate) -> Prediction {
-        skill::predict(&self.state, candidate)
+        skill::predict(&self.state, &self.library, candidate)
     }
     fn object(&self, id: ObjectId) -> Option<&ObjectEntry> {
         self.state.object(id)

@@ -187,6 +187,10 @@ impl Deltas {
                 });
                 ("skill", None, Value::Null, after)
             }
+            Change::TakenBack { transitions, restored } => {
+                let after = json!({ "transitions": transitions, "restored": restored });
+                ("taken-back", None, Value::Null, after)
+            }
             Change::Forgotten(forget) => {
                 let before = json!(forget.objects);
                 self.reread(view);
