@@ -19,7 +19,7 @@ use crate::cli::{
     memory::{ForgetArgs, MemoryCommand},
 };
 use acm_concept::ids::ObjectId;
-use acm_memory::{AcmMemory, default_library, narrow, open_store};
+use acm_memory::{AcmMemory, narrow, open_store, whole_library};
 use acm_store::{Id, Kind, Op, State, event::Sure};
 use anyhow::Context;
 use serde_json::json;
@@ -119,7 +119,7 @@ fn forget(args: &ForgetArgs) -> anyhow::Result<()> {
         }
     }
     drop(store);
-    let mut memory = AcmMemory::open(&args.dir, Arc::new(default_library()?))?;
+    let mut memory = AcmMemory::open(&args.dir, Arc::new(whole_library()?))?;
     let objects: Vec<ObjectId> = gone.iter().map(|id| ObjectId(u64::from(*id))).collect();
     memory.erase(&objects)?;
     let names: Vec<String> = objects.iter().map(ToString::to_string).collect();

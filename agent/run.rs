@@ -76,7 +76,7 @@ pub(crate) fn prepare_with(args: &RunArgs, config: Config) -> anyhow::Result<(Ep
     };
     let library = match &args.library {
         Some(dir) => acm_memory::library_from_dir(dir)?,
-        None => acm_memory::default_library()?,
+        None => acm_memory::whole_library()?,
     };
     // A misspelt method or a memory that cannot be opened must not cost the start of the renderer.
     drop(acm_baselines::by_name(&config.method, Arc::new(library.clone()), config.memory.as_deref())?);

@@ -2,8 +2,9 @@
 
 use acm_concept::ids::SkillId;
 use acm_memory::{
-    AcmMemory, Memory, MemoryError, MemoryView, default_library,
+    AcmMemory, Memory, MemoryError, MemoryView,
     entry::{General, Law, SkillEntry, Transition, TransitionResult},
+    whole_library,
 };
 use anyhow::ensure;
 use serde_json::json;
@@ -15,7 +16,7 @@ pub fn print(dir: &Path, wanted: Option<&str>, as_json: bool) -> anyhow::Result<
         return Err(MemoryError::Missing { path: dir.into() }.into());
     }
     let wanted: Option<SkillId> = wanted.map(str::parse).transpose()?;
-    let memory = AcmMemory::open(dir, Arc::new(default_library()?))?;
+    let memory = AcmMemory::open(dir, Arc::new(whole_library()?))?;
     let view = memory.view();
     let entries: Vec<&SkillEntry> =
         view.skills().iter().filter(|entry| wanted.is_none_or(|wanted| wanted == entry.id)).collect();

@@ -58,6 +58,7 @@ pub use joint::FeltJoint;
 pub use ledger::{FORMAT, open_store, read_events, store_time};
 pub use library::{
     CORE, LibraryError, MAX_TEMPLATE_FILES, default_library, library_from_dir, library_groups, library_of,
+    whole_library,
 };
 pub use memory::AcmMemory;
 pub use project::{CONCLUSIONS, FRAMES, TRANSITIONS, moment, narrow};

@@ -60,6 +60,17 @@ pub fn default_library() -> Result<TemplateLibrary, TemplateError> {
     TemplateLibrary::parse(texts(&EMBEDDED))
 }
 
+/// The library that ships inside the program, as an agent uses it that may be told of anything: the group [`CORE`], and all
+/// other groups on call.
+///
+/// ```
+/// let library = acm_memory::whole_library().unwrap();
+/// assert!(library.get("tray").unwrap().on_call && !library.get("box").unwrap().on_call);
+/// ```
+pub fn whole_library() -> Result<TemplateLibrary, LibraryError> {
+    Ok(default_library()?.with_on_call(library_of(&library_groups())?))
+}
+
 /// The groups of the library that ships inside the program, [`CORE`] first.
 pub fn library_groups() -> Vec<&'static str> {
     let mut groups: Vec<&str> = EMBEDDED.dirs().filter_map(|dir| dir.path().to_str()).collect();

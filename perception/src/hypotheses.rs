@@ -50,6 +50,18 @@ pub(crate) struct Context<'a> {
     pub remembered: Option<Known<'a>>,
 }
 
+impl Context<'_> {
+    /// Whether a template is tried: one on call only where the instruction names such a thing or memory knows one.
+    fn tries(&self, template: &Template) -> bool {
+        let named = || template.synopsis.nouns.iter().any(|noun| self.nouns.contains(&noun.noun));
+        let known = || {
+            let expected = self.remembered.iter().map(|known| known.part);
+            expected.chain(self.displaced).any(|part| part.template == template.name)
+        };
+        !template.on_call || template.stands_alone && (named() || known())
+    }
+}
+
 /// One template with its fit.
 #[derive(Debug, Clone)]
 pub(crate) struct Hypothesis<'a> {
@@ -94,7 +106,8 @@ pub(crate) fn rank<'a>(context: Context<'a>, measured: &Measured, evidence: &Evi
     }
     let rectangles = measure::rectangles(&measured.plan, YAW_STEP, 0.01);
     let circle = measure::circle(&measured.plan);
-    let templates = context.library.iter().filter(|template| template.seen_by == measured.seen_by);
+    let templates =
+        context.library.iter().filter(|template| template.seen_by == measured.seen_by && context.tries(template));
     // A rest that looks like an upright part of other sizes brings nothing that the upright stance does not.
     let lying = |rest: &&Rest| context.lying && !rest.like_upright;
     let stances = templates.flat_map(|template| {

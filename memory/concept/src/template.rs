@@ -197,6 +197,8 @@ struct SymmetryRule {
 pub struct Template {
     /// Template type tau.
     pub name: String,
+    /// Whether perception tries it only where the instruction speaks of such a thing or memory expects one.
+    pub on_call: bool,
     /// Semantic entry.
     pub synopsis: Synopsis,
     /// How it stands out from its support.
@@ -445,6 +447,13 @@ impl TemplateLibrary {
     /// The library of one template.
     pub fn of_one(template: Template) -> TemplateLibrary {
         TemplateLibrary { templates: BTreeMap::from([(template.name.clone(), template)]) }
+    }
+    /// This library and those templates of another one that it does not have, which are [on call](Template::on_call).
+    pub fn with_on_call(mut self, other: TemplateLibrary) -> TemplateLibrary {
+        for (name, template) in other.templates {
+            self.templates.entry(name).or_insert(Template { on_call: true, ..template });
+        }
+        self
     }
     /// A template by type.
     pub fn get(&self, name: &str) -> Option<&Template> {

@@ -20,8 +20,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::collections::BTreeMap;
 
-static DOORS: LazyLock<Arc<TemplateLibrary>> =
-    LazyLock::new(|| Arc::new(library_of(&["core", "parts"]).unwrap()));
+static DOORS: LazyLock<Arc<TemplateLibrary>> = LazyLock::new(|| Arc::new(library_of(&["core", "parts"]).unwrap()));
 
 /// A door as it is: what a camera sees of it, and what only trying tells.
 #[derive(Debug, Clone)]
@@ -90,7 +89,8 @@ fn meet(memory: &mut AcmMemory, number: u64, door: &Door) -> ObjectId {
     let mut id = None;
     for view in 0..2 {
         let seconds = 0.5 + f64::from(view);
-        let seen = look(memory, 2 * number + u64::from(view as u8), seconds, &[thing.clone()], &[], &open_hand(seconds));
+        let seen =
+            look(memory, 2 * number + u64::from(view as u8), seconds, &[thing.clone()], &[], &open_hand(seconds));
         id = seen.unwrap().resolved.first().map(|resolved| resolved.object);
     }
     let id = id.unwrap();
@@ -268,5 +268,8 @@ fn a_consolidation_can_be_undone_and_done_again() {
     memory.take_back(&all, true).unwrap();
     let again: Vec<SkillEntry> = memory.view().skills().to_vec();
     assert!(again.len() == after.len() && again[0].id > after[0].id);
-    assert_eq!(again.iter().map(|e| &e.general).collect::<Vec<_>>(), after.iter().map(|e| &e.general).collect::<Vec<_>>());
+    assert_eq!(
+        again.iter().map(|e| &e.general).collect::<Vec<_>>(),
+        after.iter().map(|e| &e.general).collect::<Vec<_>>()
+    );
 }

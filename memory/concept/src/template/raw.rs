@@ -238,6 +238,7 @@ impl Meaning<'_> {
         });
         Ok(Template {
             name: raw.template.clone(),
+            on_call: false,
             synopsis: self.synopsis(&raw.synopsis)?,
             seen_by: raw.seen_by,
             prior: raw.prior,
