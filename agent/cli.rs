@@ -396,6 +396,14 @@ pub enum ScenarioCommand {
     },
     /// The JSON schema of scenario files, with every field described.
     Schema,
+    /// Count how many different start worlds the seeds of a scenario give.
+    Worlds {
+        /// A scenario's name or file.
+        file: String,
+        /// The seeds: a range A..B that includes both ends.
+        #[arg(long, value_name = "SEEDS", default_value = "0..99")]
+        seed: Seeds,
+    },
     /// Draw the initial world as the agent's main camera sees it.
     Preview {
         /// A scenario's name or file.

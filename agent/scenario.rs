@@ -1,9 +1,10 @@
 //! `acm scenario`: list, check, describe, draw.
 
-use crate::cli::{Exit, ScenarioCommand};
+use crate::cli::{Exit, ScenarioCommand, Seeds};
 use acm_sim::{Scenario, Setting, SimOptions, Simulation};
 use anyhow::Context;
 use std::{
+    collections::BTreeSet,
     io::Write,
     path::Path,
     sync::{Arc, Mutex},
@@ -18,6 +19,7 @@ pub fn run(command: &ScenarioCommand) -> anyhow::Result<Exit> {
             println!("{file}: scenario `{}` is well formed: {}", scenario.name(), scenario.summary());
         }
         ScenarioCommand::Schema => println!("{}", Scenario::schema()),
+        ScenarioCommand::Worlds { file, seed } => worlds(file, *seed)?,
         ScenarioCommand::Preview { file, seed, set, out, info } => preview(file, *seed, set, out, *info)?,
     }
     Ok(Exit::Success)
@@ -25,10 +27,33 @@ pub fn run(command: &ScenarioCommand) -> anyhow::Result<Exit> {
 
 fn list() -> anyhow::Result<()> {
     let mut out = std::io::stdout().lock();
-    for name in Scenario::names() {
-        let scenario = Scenario::open(&name)?;
-        writeln!(out, "{name:<28} {}", scenario.summary())?;
+    let mut write = |names: Vec<String>| -> anyhow::Result<()> {
+        for name in names {
+            let scenario = Scenario::open(&name)?;
+            writeln!(out, "{name:<28} {}", scenario.summary())?;
+        }
+        Ok(())
+    };
+    write(Scenario::names())?;
+    for suite in Scenario::suites() {
+        write(Scenario::suite(&suite))?;
     }
+    Ok(())
+}
+
+/// Things that a start does not show, such as what a gauge will say, are not counted.
+fn worlds(file: &str, seeds: Seeds) -> anyhow::Result<()> {
+    let scenario = Scenario::open(file)?;
+    let bar = indicatif::ProgressBar::new(seeds.last - seeds.first + 1);
+    let mut digests = BTreeSet::new();
+    for seed in seeds.first..=seeds.last {
+        let options = SimOptions { seed, ..SimOptions::default() };
+        digests.insert(Simulation::without_renderer(&scenario, &options)?.world_digest());
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    let (count, seeds) = (digests.len(), seeds.last - seeds.first + 1);
+    println!("{}: {count} different start worlds in {seeds} seeds", scenario.name());
     Ok(())
 }
 

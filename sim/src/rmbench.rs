@@ -4,6 +4,7 @@
 use crate::{Scenario, SimOptions, Simulation, layout::Layout};
 use std::collections::BTreeSet;
 
+mod jittered;
 mod solved;
 
 /// The first of the published seeds.

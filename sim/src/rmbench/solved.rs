@@ -14,16 +14,16 @@ const TRAVEL_Z: f64 = 0.92;
 
 /// How a thing is gripped: height over its base, and the turn of the closing direction from its y axis.
 #[derive(Clone, Copy)]
-struct Grip {
-    height: f64,
-    turn: f64,
+pub(super) struct Grip {
+    pub(super) height: f64,
+    pub(super) turn: f64,
 }
-const CUBE: Grip = Grip { height: 0.02, turn: 0.0 };
-const KNOB: Grip = Grip { height: 0.085, turn: 0.0 };
-const STEM: Grip = Grip { height: 0.014, turn: PI / 2.0 };
-const ENDS: Grip = Grip { height: 0.02, turn: 0.0 };
+pub(super) const CUBE: Grip = Grip { height: 0.02, turn: 0.0 };
+pub(super) const KNOB: Grip = Grip { height: 0.085, turn: 0.0 };
+pub(super) const STEM: Grip = Grip { height: 0.014, turn: PI / 2.0 };
+pub(super) const ENDS: Grip = Grip { height: 0.02, turn: 0.0 };
 
-fn expert(scenario: &str, seed: u64) -> Expert {
+pub(super) fn expert(scenario: &str, seed: u64) -> Expert {
     let options = SimOptions { seed, ..SimOptions::default() };
     Expert::of(Simulation::without_renderer(&open(scenario), &options).unwrap())
 }
@@ -34,7 +34,7 @@ fn over(expert: &mut Expert, at: DVec3, yaw: f64) {
     expert.go(down(at.with_z(TRAVEL_Z), yaw), 0.25);
 }
 
-fn take(expert: &mut Expert, name: &str, grip: Grip) {
+pub(super) fn take(expert: &mut Expert, name: &str, grip: Grip) {
     let object = expert.object(name);
     let (at, yaw) = (object.pose.translation, heading(&object.pose) + grip.turn);
     expert.fingers(OPEN_M);
@@ -52,12 +52,12 @@ fn put(expert: &mut Expert, at: DVec3, yaw: f64, grip: Grip) {
     expert.go(down(at.with_z(TRAVEL_Z), yaw), 0.3);
 }
 
-fn carry(expert: &mut Expert, name: &str, at: DVec3, yaw: f64, grip: Grip) {
+pub(super) fn carry(expert: &mut Expert, name: &str, at: DVec3, yaw: f64, grip: Grip) {
     take(expert, name, grip);
     put(expert, at, yaw, grip);
 }
 
-fn heading(pose: &Pose) -> f64 {
+pub(super) fn heading(pose: &Pose) -> f64 {
     2.0 * pose.rotation.z.atan2(pose.rotation.w)
 }
 

@@ -33,7 +33,7 @@ fn mistakes_name_the_file_the_field_and_a_way_out() {
     let cases = [
         ("fov_y_deg = 50.0", "fov_y_degr = 50.0", "did you mean `fov_y_deg`"),
         ("model = \"red-cube\"", "model = \"red-cub\"", "did you mean `red-cube`"),
-        ("model = \"red-cube\"", "model = \"spaceship\"", "known: bar-microwave, blue-mat, cereal-box,"),
+        ("model = \"red-cube\"", "model = \"spaceship\"", "known: bar-microwave, blue-mat, card-box-1,"),
         ("fov_y_deg = 50.0", "fov_y_deg = 500.0", "camera `head`.fov_y_deg: 500 must lie in 1 to 170"),
         ("cube_z < 0.7\"", "cbe_z < 0.7\"", "names `cbe_z`"),
         ("before = \"the cube stands in the middle\"", "before = \"never\"", "there is no stage `never`"),
