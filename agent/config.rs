@@ -55,7 +55,7 @@ pub fn open(named: Option<&Path>) -> anyhow::Result<(Option<PathBuf>, Config)> {
 /// # Errors
 /// The file cannot be read, is no TOML, or names something that is no setting or has a value out of its range.
 pub fn read(path: &Path) -> anyhow::Result<Config> {
-    read_over(&GrounderConfig::default(), path)
+    read_over(&Settings::default().perception, path)
 }
 
 /// Reads a file; what it leaves out of `[perception]` is as in `perception`, the rest keeps its default.

@@ -14,7 +14,7 @@ use std::{
 };
 
 /// What an agent goes by, but for its memory and its words.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Settings {
     /// What to do when memory cannot decide.
@@ -26,6 +26,14 @@ pub struct Settings {
     /// [`AgentError::Tools`]: crate::AgentError::Tools
     #[serde(skip_serializing_if = "ToolSettings::is_default")]
     pub tools: ToolSettings,
+}
+
+impl Default for Settings {
+    /// An agent that acts reads what is written and shown on things: tasks speak of it.
+    fn default() -> Settings {
+        let perception = GrounderConfig { read: true, ..GrounderConfig::default() };
+        Settings { perception, on_unknown: OnUnknown::default(), tools: ToolSettings::default() }
+    }
 }
 
 /// What a language model may be asked for.

@@ -124,6 +124,9 @@ pub struct Track {
     /// Set while it may be another object than it is taken for.
     #[serde(default)]
     pub doubt: Option<Box<crate::identity::doubt::Doubt>>,
+    /// What was read on it of late.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub shown: Vec<crate::shown::Shown>,
 }
 
 /// The spot at which an object came to stand.

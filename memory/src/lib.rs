@@ -43,6 +43,7 @@ mod recent;
 mod redact;
 mod retrieve;
 pub mod scene;
+mod shown;
 mod skill;
 #[cfg(any(test, feature = "staging"))]
 pub mod staging;

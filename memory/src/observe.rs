@@ -9,7 +9,7 @@ use crate::{
     hand::HandFeeling,
     identity::{self, IdentityRule, MAX_PERCEPTS, Match, Percept, doubt::Doubt, predict},
     observation::{Grounding, Observation, Resolved},
-    scene,
+    scene, shown,
     state::MAX_OBJECTS,
 };
 use acm_concept::{
@@ -63,7 +63,8 @@ pub(crate) fn observe(draft: &mut Draft<'_>, observation: &Observation<'_>, rule
         let readable: Vec<Percept<'_>> =
             percepts.objects.iter().take(MAX_PERCEPTS).enumerate().filter_map(read).collect();
         let matches = identity::resolve(rule, &draft.state, &readable, &percepts.expected, draft.library);
-        let mut frame = Frame { draft, stage, views: &percepts.expected, percepts: &readable, grounding };
+        let eye = percepts.frame.camera_pose.translation;
+        let mut frame = Frame { draft, stage, views: &percepts.expected, percepts: &readable, eye, grounding };
         frame.take_matches(&matches, PlaceCause::Seen(percepts.frame.id));
         frame.take_absences(PlaceCause::Gone(percepts.frame.id));
         (stage, grounding) = (frame.stage, frame.grounding);
@@ -120,6 +121,8 @@ struct Frame<'f, 'a, 'p> {
     stage: Stage,
     views: &'f [ExpectedView],
     percepts: &'f [Percept<'p>],
+    /// Where it was taken from, world, metres.
+    eye: DVec3,
     grounding: Grounding,
 }
 
@@ -143,7 +146,7 @@ impl Frame<'_, '_, '_> {
         (found, matches): (&Match, &[Match]),
         cause: PlaceCause,
     ) -> Option<Resolved> {
-        let moment = self.draft.moment();
+        let (moment, eye) = (self.draft.moment(), self.eye);
         let inside_another = self.is_fragment(percept, matches);
         let seen_through = self.views.iter().any(|v| v.object == id && v.visibility == Visibility::SeenThrough);
         let confused = self.confused_with(id);
@@ -160,18 +163,18 @@ impl Frame<'_, '_, '_> {
         match verdict {
             View::Rejected => {}
             View::Pending(pending) => staged.track.pending = Some(pending),
-            View::InHand => remember_view(&mut staged.entry, percept, moment),
+            View::InHand => remember_view(staged, percept, moment, eye),
             View::InPlace(parts) => {
                 let back = staged.entry.presence == Presence::Missing;
                 staged.entry.verified = !back && (staged.entry.verified || found.probability >= SURE_MATCH);
                 settle_place(staged, parts, back.then_some(cause));
-                remember_view(&mut staged.entry, percept, moment);
+                remember_view(staged, percept, moment, eye);
             }
             View::Moved(parts) => {
                 // An own action and a view of its outcome are two witnesses; one view alone is not.
                 staged.entry.verified = own && found.probability >= SURE_MATCH;
                 settle_place(staged, parts, Some(cause));
-                remember_view(&mut staged.entry, percept, moment);
+                remember_view(staged, percept, moment, eye);
                 if !own {
                     self.grounding.moved.push(id);
                 }
@@ -429,14 +432,19 @@ fn settle_place(staged: &mut Staged, parts: Vec<GroundedPart>, cause: Option<Pla
     staged.entry.parts = parts;
     staged.entry.presence = Presence::Present;
     staged.placed = cause;
-    let doubt = staged.track.doubt.take();
+    let (doubt, shown) = (staged.track.doubt.take(), std::mem::take(&mut staged.track.shown));
     let anchor = position.map(|position| Anchor::seen_at(anchor, position));
-    staged.track = Track { anchor, doubt, ..Track::default() };
+    staged.track = Track { anchor, doubt, shown, ..Track::default() };
 }
 
 /// What every accepted view adds, wherever it shows the object.
-fn remember_view(entry: &mut ObjectEntry, percept: &Percept<'_>, moment: Moment) {
-    let object = percept.object;
+fn remember_view(staged: &mut Staged, percept: &Percept<'_>, moment: Moment, eye: DVec3) {
+    let (object, entry) = (percept.object, &mut staged.entry);
+    shown::add(&mut staged.track.shown, &object.readings, eye);
+    if !object.readings.is_empty() {
+        entry.state.retain(|literal| !shown::PREDICATES.contains(&literal.predicate.as_str()));
+        entry.state.extend(shown::literals(entry.id, &staged.track.shown));
+    }
     if !object.truncated && entry.presence != Presence::Held {
         entry.appearance = fusion::fuse_appearance(&entry.appearance, &object.appearance, entry.views);
         entry.categories = fusion::fuse_categories(&entry.categories, &object.categories, entry.views);

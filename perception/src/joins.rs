@@ -30,6 +30,10 @@ const FRINGE_CUT: f64 = 0.3;
 const FRINGE_THICK: f64 = 0.1;
 /// Evidence (negative log likelihood) that it takes to believe that two things lie like the parts of one.
 const COINCIDENCE: f64 = 15.0;
+/// The same where the one is on call and the instruction speaks of it, and what it then explains of surface and outline.
+const SPOKEN_OF: f64 = 60.0;
+const SPOKEN_OF_SURFACE: f64 = 0.96;
+const SPOKEN_OF_OUTLINE: f64 = 0.77;
 /// Each of two things explains this share of its surface and of its outline.
 const PARTED_SURFACE: f64 = 0.85;
 const PARTED_OUTLINE: f64 = 0.75;
@@ -273,11 +277,15 @@ fn is_one_with(scene: &Scene, segments: &Segments, context: Context, a: &Piece, 
     }
     let joint = union(scene, segments, a, b, false);
     let Some(comparison) = compare(context, &joint, a, b) else { return false };
-    // Two things seldom lie as the parts of one do.
-    let coincidence = if comparison.solids > 1 { COINCIDENCE } else { 0.0 };
+    // Two things seldom lie as the parts of one do, least of all of one that is spoken of.
+    let (coincidence, on_surface, on_outline) = match comparison.solids {
+        1 => (0.0, 0.93, 0.85),
+        _ if comparison.spoken_of => (SPOKEN_OF, SPOKEN_OF_SURFACE, SPOKEN_OF_OUTLINE),
+        _ => (COINCIDENCE, 0.93, 0.85),
+    };
     comparison.together < comparison.apart + coincidence
-        && comparison.on_surface > 0.93
-        && comparison.on_outline > 0.85
+        && comparison.on_surface > on_surface
+        && comparison.on_outline > on_outline
         && (touching || comparison.solids > 1)
 }
 
@@ -287,6 +295,8 @@ struct Comparison {
     apart: f64,
     /// Of which the one is made.
     solids: usize,
+    /// Whether the one is tried only because the instruction speaks of it, or memory knows it.
+    spoken_of: bool,
     on_surface: f64,
     on_outline: f64,
 }
@@ -305,6 +315,7 @@ fn compare(context: Context, joint: &Evidence, a: &Piece, b: &Piece) -> Option<C
         together: penalty(&one, joint) * share.max(1.0),
         apart: penalty(&left, &a.evidence) + penalty(&right, &b.evidence),
         solids: one.model.solids(&one.minimum.state).len(),
+        spoken_of: one.model.template.on_call,
         on_surface,
         on_outline,
     })

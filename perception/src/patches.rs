@@ -1,7 +1,8 @@
-//! Flat patches: areas of the plane that differ from it by colour alone.
+//! Flat patches: areas of the plane that differ from it by colour alone, and plates too low to stand on it.
 
 use crate::{
     fit::{Evidence, OutlineKind, OutlinePoint},
+    grid::Grid,
     measure::{self, Rectangle},
     scan::Tint,
     scene::Scene,
@@ -32,6 +33,9 @@ const LONGEST_M: f64 = 0.45;
 /// A common rectangle may be this much less full than its pieces' own: a gap of 1 cm between two mats of 8 cm
 /// takes three times as much.
 const JOINT_LOSS: f64 = 0.02;
+
+/// Print covers no more than this share of what is left bare round it.
+const PRINT: f64 = 0.5;
 
 /// What is lighter than the surface by this much (CIELAB) has another colour; what is darker may lie in the shade.
 const LIGHTER: f32 = 14.0;
@@ -67,6 +71,7 @@ pub(crate) fn find(scene: &Scene, standing: &[bool]) -> Vec<Patch> {
         }
     }
     join_pieces(scene, &ground, &mut pieces);
+    pieces.iter_mut().for_each(|piece| take_print(scene.grid, &covered, piece));
     pieces.into_iter().filter_map(|pixels| patch(scene, &ground, pixels)).collect()
 }
 
@@ -82,6 +87,43 @@ fn areas(scene: &Scene, (labels, sizes): (Vec<u32>, Vec<usize>)) -> Vec<Vec<usiz
     areas
 }
 
+/// Adds to a piece what is printed on it: what it encloses, where nothing stands and that is not too much of it.
+fn take_print(grid: Grid, covered: &[bool], piece: &mut Vec<usize>) {
+    let columns = || piece.iter().map(|&at| grid.column(at));
+    let (Some(left), Some(right)) = (columns().min(), columns().max()) else { return };
+    let (Some(&first), Some(&last)) = (piece.first(), piece.last()) else { return };
+    let (width, height) = (right - left + 3, grid.row(last) - grid.row(first) + 3);
+    // The piece in a window with a margin of one pixel, from which the outside is flooded.
+    let mut window = vec![false; width * height];
+    for &at in piece.iter() {
+        window[(grid.row(at) - grid.row(first) + 1) * width + grid.column(at) - left + 1] = true;
+    }
+    let mut front = vec![0usize];
+    let mut outside = vec![false; width * height];
+    outside[0] = true;
+    while let Some(at) = front.pop() {
+        let (column, row) = (at % width, at / width);
+        let near = [
+            (column > 0).then(|| at - 1),
+            (column + 1 < width).then(|| at + 1),
+            (row > 0).then(|| at - width),
+            (row + 1 < height).then(|| at + width),
+        ];
+        for next in near.into_iter().flatten().filter(|&next| !window[next]) {
+            if !std::mem::replace(&mut outside[next], true) {
+                front.push(next);
+            }
+        }
+    }
+    let pixel = |at: usize| grid.index(at % width + left - 1, at / width + grid.row(first) - 1);
+    let print: Vec<usize> = (0..window.len()).filter(|&at| !window[at] && !outside[at]).map(pixel).collect();
+    if print.len() as f64 > PRINT * piece.len() as f64 || print.iter().any(|&at| covered[at]) {
+        return;
+    }
+    piece.extend(print);
+    piece.sort_unstable();
+}
+
 /// Whether an area fills a rectangle on the surface as a patch does.
 fn is_full(scene: &Scene, ground: &[Ground], pixels: &[usize]) -> bool {
     rectangle(&plan(scene, pixels)).is_some_and(|r| r.length < LONGEST_M && fill(scene, ground, &r, pixels) > FULL)
@@ -89,7 +131,9 @@ fn is_full(scene: &Scene, ground: &[Ground], pixels: &[usize]) -> bool {
 
 fn classify(scene: &Scene, surface: &SurfaceTint, covered: &[bool], index: usize) -> Ground {
     let dark = scene.scan.lab[index][0] < 8.0;
-    if covered[index] || scene.own[index] || !scene.in_plane[index] || dark {
+    // What rises a little, and was too low to be a thing, is a plate that lies there.
+    let level = scene.in_plane[index] || scene.rising[index];
+    if covered[index] || scene.own[index] || !level || dark {
         return Ground::Unknown;
     }
     let distance = scene.scan.tint(index).distance(&surface.at(scene, index));
