@@ -19,7 +19,7 @@ use crate::cli::{
     memory::{ForgetArgs, MemoryCommand},
 };
 use acm_concept::ids::ObjectId;
-use acm_memory::{AcmMemory, default_library, narrow, open_store};
+use acm_memory::{AcmMemory, Policy, default_library, narrow, open_store};
 use acm_store::{Id, Kind, Op, State, event::Sure};
 use anyhow::Context;
 use serde_json::json;
@@ -35,6 +35,7 @@ pub fn run(command: &MemoryCommand) -> anyhow::Result<Exit> {
         MemoryCommand::Skills { dir, skill, json } => skills::print(dir, skill.as_deref(), *json)?,
         MemoryCommand::At(args) => past::at(args)?,
         MemoryCommand::Forget(args) => forget(args)?,
+        MemoryCommand::Compact { dir, keep_runs } => compact(dir, *keep_runs)?,
         MemoryCommand::Verify { dir } => verify(dir)?,
         MemoryCommand::Export { dir, format, out } => export::run(dir, *format, out)?,
     }
@@ -103,8 +104,12 @@ fn forget(args: &ForgetArgs) -> anyhow::Result<()> {
     let (regions, sources) =
         (find(store.state(), Kind::Region, &args.region)?, find(store.state(), Kind::Source, &args.source)?);
     let mut gone: BTreeSet<Id> = args.object.iter().map(|text| object(text)).collect::<anyhow::Result<_>>()?;
-    if gone.is_empty() && regions.is_empty() && sources.is_empty() {
-        anyhow::bail!("nothing is named that should be forgotten: use --object, --region or --source");
+    let policy =
+        Policy { older_than_runs: args.older_than, keep_most: args.keep, below_confidence: args.below };
+    if gone.is_empty() && regions.is_empty() && sources.is_empty() && policy == Policy::default() {
+        anyhow::bail!(
+            "nothing is named that should be forgotten: use --object, --region, --source, --older-than, --keep or --below"
+        );
     }
     // A memory's beliefs are whole objects: one of which a source spoke goes with all that is known of it.
     for (_, event) in store.events()? {
@@ -120,10 +125,26 @@ fn forget(args: &ForgetArgs) -> anyhow::Result<()> {
     }
     drop(store);
     let mut memory = AcmMemory::open(&args.dir, Arc::new(default_library()?))?;
-    let objects: Vec<ObjectId> = gone.iter().map(|id| ObjectId(u64::from(*id))).collect();
-    memory.erase(&objects)?;
+    let mut objects: BTreeSet<ObjectId> = gone.iter().map(|id| ObjectId(u64::from(*id))).collect();
+    objects.extend(memory.due(&policy));
+    let objects: Vec<ObjectId> = objects.into_iter().collect();
+    if !args.dry_run {
+        memory.erase(&objects)?;
+    }
     let names: Vec<String> = objects.iter().map(ToString::to_string).collect();
-    println!("forgotten: {}", if names.is_empty() { "nothing was there".into() } else { names.join(" ") });
+    let done = if args.dry_run { "would be forgotten" } else { "forgotten" };
+    println!("{done}: {}", if names.is_empty() { "nothing was there".into() } else { names.join(" ") });
+    Ok(())
+}
+
+fn compact(dir: &Path, keep_runs: u32) -> anyhow::Result<()> {
+    drop(open_store(dir)?);
+    let mut memory = AcmMemory::open(dir, Arc::new(default_library()?))?;
+    let done = memory.compact(keep_runs)?;
+    println!(
+        "{} events in {} bytes, before {} in {}",
+        done.events.1, done.bytes.1, done.events.0, done.bytes.0
+    );
     Ok(())
 }
 

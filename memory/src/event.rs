@@ -2,7 +2,7 @@
 //! when the rules that decide are improved. The format is described in docs/memory-format.md.
 
 use crate::{
-    entry::{HistoryEntry, Moment, ObjectEntry, SkillEntry, Transition, TransitionResult},
+    entry::{HistoryEntry, Moment, ObjectEntry, SkillEntry, TaskProgress, Transition, TransitionResult},
     hand::HandFeeling,
 };
 use acm_concept::{
@@ -10,6 +10,7 @@ use acm_concept::{
     literal::{Evidence, Literal},
     object::{GroundedPart, SupportPlane, Visibility},
     pose::Pose,
+    time::Time,
 };
 use serde::{Deserialize, Serialize};
 
@@ -91,6 +92,9 @@ pub enum Change {
     },
     /// Some of memory was dropped.
     Forgotten(Forget),
+    /// The log was written anew: the events before this one say what is still believed of objects, transitions and
+    /// skills, and this one the rest.
+    Compacted(Box<Rest>),
     /// Everything dynamic was dropped; ids go on where they were, so that none is ever given twice.
     Wiped(Counters),
 }
@@ -190,6 +194,28 @@ pub struct Forget {
     pub transitions_before: Option<TransitionId>,
     /// Whether to drop skill memory.
     pub skills: bool,
+}
+
+/// What is believed beside objects, transitions and skills.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Rest {
+    /// Where the agent is in its instruction.
+    pub progress: TaskProgress,
+    /// The surface on which things stand.
+    pub support: Option<SupportPlane>,
+    /// Frames of the run that showed something.
+    pub frames_seen: u32,
+    /// The last frame.
+    pub glance: Option<Glance>,
+    /// What the fingers felt last.
+    pub hand: HandFeeling,
+    /// The ids that come next.
+    pub next: Counters,
+    /// Virtual time within the run.
+    pub now: Time,
+    /// Whether memory goes back to the beginning of the run.
+    pub from_start: bool,
 }
 
 /// The ids that come next.

@@ -24,6 +24,7 @@ pub mod entry;
 pub mod event;
 mod execute;
 mod expect;
+mod forgetting;
 mod fusion;
 pub mod geometry;
 mod hand;
@@ -52,6 +53,8 @@ mod tests;
 mod traits;
 mod view;
 
+pub use acm_store::compact::Compacted;
+pub use forgetting::Policy;
 pub use hand::HandFeeling;
 pub use identity::{IdentityRule, MAX_PERCEPTS};
 pub use joint::FeltJoint;

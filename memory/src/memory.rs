@@ -3,8 +3,10 @@
 use crate::{
     consolidate,
     draft::Draft,
+    entry::Moment,
     event::{Change, Counters, Event, Forget, Source},
     execute, expect,
+    forgetting::{self, Policy},
     identity::IdentityRule,
     ledger::Ledger,
     observation::{Executed, Grounding, Note, Observation, Verdict},
@@ -20,6 +22,7 @@ use acm_concept::{
     template::TemplateLibrary,
     time::Time,
 };
+use acm_store::compact::Compacted;
 use std::{path::Path, sync::Arc};
 
 /// Analytic concept-centric memory: object, scene, transition and skill memory over a library of templates.
@@ -98,17 +101,35 @@ impl AcmMemory {
     /// Forgets objects and what was done to them so that no byte of them stays in the folder. What skills learned from
     /// them stays, as numbers without a link; so do words of the instruction.
     pub fn erase(&mut self, objects: &[ObjectId]) -> Result<(), MemoryError> {
-        let kept = self.ledger.forget(&objects.iter().copied().collect())?;
         let next = self.state.next;
-        self.state = fold(&kept).map_err(|(record, reason)| MemoryError::Record {
-            path: self.ledger.path().into(),
-            record,
-            reason,
-        })?;
-        // An id is never given twice.
-        self.state.next = Counters { episode: self.state.next.episode, ..next };
+        let last = |kept: &[Event]| {
+            let mut state = fold(kept).map_err(|(_, reason)| reason)?;
+            // An id is never given twice.
+            state.next = Counters { episode: state.next.episode, ..next };
+            let rest = forgetting::rest(&state);
+            Ok((state, rest))
+        };
+        self.state = self.ledger.forget(&objects.iter().copied().collect(), last)?;
         self.recent = RecentEvents::default();
         Ok(())
+    }
+    /// The objects that a policy forgets, in the order of their ids; see [`AcmMemory::erase`].
+    pub fn due(&self, policy: &Policy) -> Vec<ObjectId> {
+        forgetting::due(&self.state, policy)
+    }
+    /// Writes the log anew: of the runs before the last `keep_runs` ones it then holds what is believed of them now, with
+    /// histories, transitions and skills, and no longer how that came about. What was so since then can still be asked
+    /// for as it was known then; nothing that is believed changes.
+    ///
+    /// # Errors
+    /// The folder cannot be written, or an entry is larger than an event may be: then the old log stays.
+    pub fn compact(&mut self, keep_runs: u32) -> Result<Compacted, MemoryError> {
+        let first = (self.state.next.episode + 1).saturating_sub(keep_runs);
+        let digest = |before: &[Event]| match before {
+            [] => Ok(Vec::new()),
+            before => fold(before).map(|state| forgetting::digest(&state)).map_err(|(_, reason)| reason),
+        };
+        self.ledger.compact(Moment { episode: first, time: Time::ZERO }, digest)
     }
     /// Writes the engine's columns beside the log, for whoever asks them alone.
     pub fn write_snapshot(&mut self) -> Result<(), MemoryError> {

@@ -104,6 +104,11 @@ pub(crate) fn event(mut event: Event, dropped: &mut Dropped<'_>) -> Option<Event
             });
         }
         Change::Frame(glance) => glance.visibility.retain(|(id, _)| !dropped.has(*id)),
+        Change::Compacted(rest) => {
+            if let Some(glance) = &mut rest.glance {
+                glance.visibility.retain(|(id, _)| !dropped.has(*id));
+            }
+        }
         Change::Forgotten(forget) => forget.objects.retain(|id| !dropped.has(*id)),
         Change::EpisodeBegan
         | Change::Instructed { .. }

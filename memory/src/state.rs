@@ -2,7 +2,7 @@
 
 use crate::{
     entry::{HistoryEntry, Moment, ObjectEntry, Presence, SkillEntry, TaskProgress, Transition},
-    event::{Believed, Change, Counters, Event, Forget, Glance, Track},
+    event::{Believed, Change, Counters, Event, Forget, Glance, Rest, Track},
     hand::HandFeeling,
 };
 use acm_concept::{
@@ -99,6 +99,7 @@ impl State {
                 }
             }
             Change::Forgotten(forget) => self.forget(forget),
+            Change::Compacted(rest) => self.take_rest(rest),
             Change::Wiped(counters) => {
                 *self = State { next: *counters, now: event.moment.time, ..State::default() };
             }
@@ -125,6 +126,13 @@ impl State {
         self.tracks = Arc::new(kept.collect());
     }
 
+    fn take_rest(&mut self, rest: &Rest) {
+        self.progress.clone_from(&rest.progress);
+        (self.support, self.frames_seen, self.hand) = (rest.support, rest.frames_seen, rest.hand);
+        self.glance.clone_from(&rest.glance);
+        (self.next, self.now, self.from_start) = (rest.next, rest.now, rest.from_start);
+    }
+
     fn put_object(&mut self, believed: &Believed) {
         let id = believed.entry.id;
         let objects = Arc::make_mut(&mut self.objects);
@@ -149,7 +157,13 @@ impl State {
                 last.verified |= entry.verified;
             }
         }
-        Arc::make_mut(&mut self.tracks).insert(id, believed.track.clone());
+        let tracks = Arc::make_mut(&mut self.tracks);
+        // An object of which nothing is tracked has no track, however that came about.
+        if believed.track == Track::default() {
+            tracks.remove(&id);
+        } else {
+            tracks.insert(id, believed.track.clone());
+        }
         self.next.object = self.next.object.max(id.0 + 1);
     }
 

@@ -196,6 +196,10 @@ impl Deltas {
                 self.reread(view);
                 ("forgotten", None, before, json!(forget))
             }
+            Change::Compacted(_) => {
+                self.reread(view);
+                ("compacted", None, Value::Null, Value::Null)
+            }
             Change::Wiped(_) => {
                 let before = json!(std::mem::take(&mut self.objects).into_keys().collect::<Vec<_>>());
                 ("wiped", None, before, Value::Null)

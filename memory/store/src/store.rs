@@ -329,19 +329,27 @@ impl Store {
     fn put_log(&mut self, batches: &[(Nanos, Vec<Event>)]) -> io::Result<()> {
         let first = self.log.segment() + 1;
         let mut log = Log::begin(&mut *self.disk, first, Place { batch: 0, next: 0 })?;
-        let mut bytes = Batch::default();
+        // Many batches are written as one group: each alone would begin on a block of its own.
+        let (mut bytes, mut open) = (Batch::default(), None);
+        let mut next = 0;
         for (time, events) in batches {
-            let place = log.place();
-            let mut next = place.next;
+            if let Some(before) = open {
+                bytes.mark(next, before);
+            }
             for event in events {
                 if !bytes.event(next, |out| event::write(event, out)) {
                     return Err(io::Error::other("an event is larger than a record may be"));
                 }
                 next += 1;
             }
-            bytes.commit(place.batch, next, *time);
-            log.write(&mut *self.disk, bytes.bytes(), Place { batch: place.batch + 1, next })?;
-            bytes.clear();
+            open = Some(*time);
+            if bytes.bytes().len() >= GROUP_BYTES {
+                put_group(&mut log, &mut *self.disk, &mut bytes, next, *time)?;
+                open = None;
+            }
+        }
+        if let Some(time) = open {
+            put_group(&mut log, &mut *self.disk, &mut bytes, next, time)?;
         }
         log.sync(&mut *self.disk)?;
         self.manifest = Manifest { first, snapshot: None };
@@ -358,6 +366,14 @@ impl Store {
         }
         Ok(sum)
     }
+}
+
+fn put_group(log: &mut Log, disk: &mut dyn Disk, bytes: &mut Batch, next: u64, time: Nanos) -> io::Result<()> {
+    let batch = log.place().batch;
+    bytes.commit(batch, next, time);
+    log.write(disk, bytes.bytes(), Place { batch: batch + 1, next })?;
+    bytes.clear();
+    Ok(())
 }
 
 /// Removes what a crash or a rewrite left behind: it is in no manifest.
