@@ -104,8 +104,7 @@ fn forget(args: &ForgetArgs) -> anyhow::Result<()> {
     let (regions, sources) =
         (find(store.state(), Kind::Region, &args.region)?, find(store.state(), Kind::Source, &args.source)?);
     let mut gone: BTreeSet<Id> = args.object.iter().map(|text| object(text)).collect::<anyhow::Result<_>>()?;
-    let policy =
-        Policy { older_than_runs: args.older_than, keep_most: args.keep, below_confidence: args.below };
+    let policy = Policy { older_than_runs: args.older_than, keep_most: args.keep, below_confidence: args.below };
     if gone.is_empty() && regions.is_empty() && sources.is_empty() && policy == Policy::default() {
         anyhow::bail!(
             "nothing is named that should be forgotten: use --object, --region, --source, --older-than, --keep or --below"
@@ -141,10 +140,7 @@ fn compact(dir: &Path, keep_runs: u32) -> anyhow::Result<()> {
     drop(open_store(dir)?);
     let mut memory = AcmMemory::open(dir, Arc::new(default_library()?))?;
     let done = memory.compact(keep_runs)?;
-    println!(
-        "{} events in {} bytes, before {} in {}",
-        done.events.1, done.bytes.1, done.events.0, done.bytes.0
-    );
+    println!("{} events in {} bytes, before {} in {}", done.events.1, done.bytes.1, done.events.0, done.bytes.0);
     Ok(())
 }
 

@@ -79,7 +79,8 @@ impl Ledger {
         let mut scratch = acm_store::State::default();
         let mut written = Vec::with_capacity(batches.len());
         for events in batches {
-            let (batch, time) = self.projector.batch(&mut scratch, events, self.documents).map_err(|r| self.record(r))?;
+            let (batch, time) =
+                self.projector.batch(&mut scratch, events, self.documents).map_err(|r| self.record(r))?;
             scratch.commit(time);
             written.push((time, batch));
         }
@@ -88,15 +89,20 @@ impl Ledger {
         Ok(())
     }
     /// Writes the log anew without some objects and what was done to them; gives what is left, with what `last` makes of
-    /// it behind it. What is left is known since when it was.
+    /// it behind it. What is left is known since when it was; where no events are kept, since now, as `present` tells it.
     pub(crate) fn forget<T>(
         &mut self,
         gone: &BTreeSet<ObjectId>,
+        present: impl FnOnce() -> Vec<Event>,
         last: impl FnOnce(&[Event]) -> Result<(T, Event), String>,
     ) -> Result<T, MemoryError> {
         let mut dropped = Dropped::new(gone);
         let (mut batches, mut known): (Vec<Vec<Event>>, _) = (Vec::new(), None);
-        for (time, event) in told_events(&self.path, &mut self.store)? {
+        let told = match self.documents {
+            true => told_events(&self.path, &mut self.store)?,
+            false => present().into_iter().map(|event| (0, event)).collect(),
+        };
+        for (time, event) in told {
             let Some(event) = redact::event(event, &mut dropped) else { continue };
             match batches.last_mut() {
                 Some(batch) if known == Some(time) => batch.push(event),

@@ -109,7 +109,8 @@ impl AcmMemory {
             let rest = forgetting::rest(&state);
             Ok((state, rest))
         };
-        self.state = self.ledger.forget(&objects.iter().copied().collect(), last)?;
+        let present = || forgetting::digest(&self.state);
+        self.state = self.ledger.forget(&objects.iter().copied().collect(), present, last)?;
         self.recent = RecentEvents::default();
         Ok(())
     }

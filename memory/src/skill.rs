@@ -111,11 +111,7 @@ fn statistics(
     let mut all_hold = true;
     for condition in &general.learned {
         let literal = condition.literal.substitute(bind);
-        let truth = if literal.is_ground() {
-            belief::belief(state, library, &literal).truth
-        } else {
-            Truth::Unknown
-        };
+        let truth = if literal.is_ground() { belief::belief(state, library, &literal).truth } else { Truth::Unknown };
         match truth {
             Truth::No => return (condition.failures_without, 0),
             Truth::Unknown => all_hold = false,

@@ -95,7 +95,11 @@ impl State {
             Change::TakenBack { transitions, restored } => {
                 let all = Arc::make_mut(&mut self.taken_back);
                 for transition in transitions {
-                    if *restored { all.remove(transition) } else { all.insert(*transition) };
+                    if *restored {
+                        all.remove(transition)
+                    } else {
+                        all.insert(*transition)
+                    };
                 }
             }
             Change::Forgotten(forget) => self.forget(forget),

@@ -47,8 +47,12 @@ pub(super) fn learned(
             && !declared.contains(&known.literal)
             && chance(known) * questions as f64 <= ACCIDENT
     };
-    let mut found: Vec<LearnedCondition> =
-        counts.into_iter().zip(denied).filter(|(known, denied)| teaches(known, *denied)).map(|(known, _)| known).collect();
+    let mut found: Vec<LearnedCondition> = counts
+        .into_iter()
+        .zip(denied)
+        .filter(|(known, denied)| teaches(known, *denied))
+        .map(|(known, _)| known)
+        .collect();
     found.sort_by_cached_key(|known| (u32::MAX - known.failures_without, known.literal.to_string()));
     found
 }

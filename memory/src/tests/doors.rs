@@ -20,8 +20,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::collections::BTreeMap;
 
-static DOORS: LazyLock<Arc<TemplateLibrary>> =
-    LazyLock::new(|| Arc::new(library_of(&["core", "parts"]).unwrap()));
+static DOORS: LazyLock<Arc<TemplateLibrary>> = LazyLock::new(|| Arc::new(library_of(&["core", "parts"]).unwrap()));
 
 /// A door as it is: what a camera sees of it, and what only trying tells.
 #[derive(Debug, Clone)]
@@ -90,7 +89,8 @@ fn begin(memory: &mut AcmMemory) {
 /// All doors of a corridor are seen, twice. They are then the objects 1, 2, and so on.
 fn walk_past(memory: &mut AcmMemory, doors: &[Door]) {
     begin(memory);
-    let things: Vec<Thing> = (0u32..).zip(doors).map(|(n, door)| door.thing().at(2.0 * f64::from(n), 0.0, 0.0)).collect();
+    let things: Vec<Thing> =
+        (0u32..).zip(doors).map(|(n, door)| door.thing().at(2.0 * f64::from(n), 0.0, 0.0)).collect();
     for view in 0..2u8 {
         let seen = look(memory, view.into(), view.into(), &things, &[], &open_hand(view.into())).unwrap();
         let ids = seen.resolved.iter().map(|resolved| resolved.object.0);
@@ -286,5 +286,8 @@ fn a_consolidation_can_be_undone_and_done_again() {
     memory.take_back(&all, true).unwrap();
     let again: Vec<SkillEntry> = memory.view().skills().to_vec();
     assert!(again.len() == after.len() && again[0].id > after[0].id);
-    assert_eq!(again.iter().map(|e| &e.general).collect::<Vec<_>>(), after.iter().map(|e| &e.general).collect::<Vec<_>>());
+    assert_eq!(
+        again.iter().map(|e| &e.general).collect::<Vec<_>>(),
+        after.iter().map(|e| &e.general).collect::<Vec<_>>()
+    );
 }

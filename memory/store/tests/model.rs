@@ -212,7 +212,8 @@ fn run(seed: u64, steps: usize, compacts: bool) -> Result<(), String> {
         reference.commit(&events, time);
         moments.extend([time, time - 5_000]);
         if step % 8 == 0 {
-            agree(store.state(), &reference, &mut world, &moments, compacted).map_err(|e| format!("step {step}: {e}"))?;
+            agree(store.state(), &reference, &mut world, &moments, compacted)
+                .map_err(|e| format!("step {step}: {e}"))?;
             match world.draw.below(if compacts { 7 } else { 5 }) {
                 0 => drop(store.view()),
                 1 => store.snapshot(b"mine").unwrap(),
@@ -231,7 +232,8 @@ fn run(seed: u64, steps: usize, compacts: bool) -> Result<(), String> {
                 }
                 _ => {}
             }
-            agree(store.state(), &reference, &mut world, &moments, compacted).map_err(|e| format!("step {step}, again: {e}"))?;
+            agree(store.state(), &reference, &mut world, &moments, compacted)
+                .map_err(|e| format!("step {step}, again: {e}"))?;
         }
     }
     Ok(())
@@ -259,7 +261,8 @@ fn compaction_drops_what_was_superseded_and_keeps_what_was_said_since() {
     store.commit(&(0..20).map(|id| world.put(id, 1)).collect::<Vec<_>>(), 1).unwrap();
     let source = world.words.source;
     for time in 2..2000u64 {
-        let mut event = Event::new(time, source, 1.0, vec![Op::Move(time as Id % 20, [time as f32, 0.5, 0.5], [0.0; 3])]);
+        let mut event =
+            Event::new(time, source, 1.0, vec![Op::Move(time as Id % 20, [time as f32, 0.5, 0.5], [0.0; 3])]);
         event.document = format!("step {time}").into_bytes();
         store.commit(&[event], time).unwrap();
     }
