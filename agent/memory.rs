@@ -19,7 +19,7 @@ use crate::cli::{
     memory::{ForgetArgs, MemoryCommand},
 };
 use acm_concept::ids::ObjectId;
-use acm_memory::{AcmMemory, Policy, default_library, narrow, open_store};
+use acm_memory::{AcmMemory, MemoryError, Policy, default_library, narrow, open_store};
 use acm_store::{Id, Kind, Op, State, event::Sure};
 use anyhow::Context;
 use serde_json::json;
@@ -35,6 +35,20 @@ pub fn run(command: &MemoryCommand) -> anyhow::Result<Exit> {
         MemoryCommand::Skills { dir, skill, json } => skills::print(dir, skill.as_deref(), *json)?,
         MemoryCommand::At(args) => past::at(args)?,
         MemoryCommand::Forget(args) => forget(args)?,
+        MemoryCommand::Merge { dir, kept, gone } => {
+            let (kept, gone): (ObjectId, ObjectId) = (kept.parse()?, gone.parse()?);
+            let number = opened(dir)?.merge(kept, gone)?;
+            println!("{gone} is {kept}: merge {number}, which `acm memory undo` undoes");
+        }
+        MemoryCommand::Split { dir, object, since } => {
+            let from: ObjectId = object.parse()?;
+            let (number, new) = opened(dir)?.split(from, acm_memory::moment(past::parse(since)?))?;
+            println!("{from} was {new} since then: split {number}, which `acm memory undo` undoes");
+        }
+        MemoryCommand::Undo { dir, number } => {
+            opened(dir)?.undo_regrouping(*number)?;
+            println!("{number} is undone");
+        }
         MemoryCommand::Compact { dir, keep_runs } => compact(dir, *keep_runs)?,
         MemoryCommand::Verify { dir } => verify(dir)?,
         MemoryCommand::Export { dir, format, out } => export::run(dir, *format, out)?,
@@ -136,9 +150,16 @@ fn forget(args: &ForgetArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// The memory of a folder that is there already.
+fn opened(dir: &Path) -> anyhow::Result<AcmMemory> {
+    if !dir.join(acm_store::manifest::NAME).is_file() {
+        return Err(MemoryError::Missing { path: dir.into() }.into());
+    }
+    Ok(AcmMemory::open(dir, Arc::new(default_library()?))?)
+}
+
 fn compact(dir: &Path, keep_runs: u32) -> anyhow::Result<()> {
-    drop(open_store(dir)?);
-    let mut memory = AcmMemory::open(dir, Arc::new(default_library()?))?;
+    let mut memory = opened(dir)?;
     let done = memory.compact(keep_runs)?;
     println!("{} events in {} bytes, before {} in {}", done.events.1, done.bytes.1, done.events.0, done.bytes.0);
     Ok(())

@@ -43,6 +43,31 @@ pub enum MemoryCommand {
     At(AtArgs),
     /// Forget objects, regions, sources, or what a policy names, so that no byte of them stays in the folder.
     Forget(ForgetArgs),
+    /// Take two identities for one thing; what was seen last is believed.
+    Merge {
+        /// The folder.
+        dir: PathBuf,
+        /// The identity that stays, such as O3: the one that was known first has its whole past.
+        kept: String,
+        /// The one that goes.
+        gone: String,
+    },
+    /// Take an identity for two things: since a moment it was another one.
+    Split {
+        /// The folder.
+        dir: PathBuf,
+        /// The identity, such as O3.
+        object: String,
+        /// Since when: the run's number and seconds in it, as in 2:31.5.
+        since: String,
+    },
+    /// Undo a merge or a split.
+    Undo {
+        /// The folder.
+        dir: PathBuf,
+        /// Its number, as `merge` and `split` printed it.
+        number: u32,
+    },
     /// Write the log anew without what nobody asks for any more; what is believed stays.
     Compact {
         /// The folder.

@@ -66,7 +66,7 @@ pub fn at(args: &AtArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn parse(text: &str) -> anyhow::Result<u64> {
+pub(super) fn parse(text: &str) -> anyhow::Result<u64> {
     let wrong = || format!("`{text}` is no moment: write the run's number and seconds in it, as in 2:31.5");
     let (episode, seconds) = text.split_once(':').with_context(wrong)?;
     let seconds: f64 = seconds.parse().with_context(wrong)?;

@@ -69,6 +69,8 @@ pub(crate) fn rest(state: &State) -> Event {
         next: state.next,
         now: state.now,
         from_start: state.from_start,
+        regrouped: state.regrouped.to_vec(),
+        regroupings: state.regroupings,
     };
     event(state, Change::Compacted(Box::new(rest)))
 }

@@ -42,6 +42,7 @@ pub mod query;
 mod recall;
 mod recent;
 mod redact;
+mod regroup;
 mod retrieve;
 pub mod scene;
 mod skill;

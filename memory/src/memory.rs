@@ -12,6 +12,7 @@ use crate::{
     observation::{Executed, Grounding, Note, Observation, Verdict},
     observe,
     recent::{Recent, RecentEvents},
+    regroup,
     state::State,
     traits::{Memory, MemoryError, MemoryView},
     view::Snapshot,
@@ -113,6 +114,38 @@ impl AcmMemory {
         self.state = self.ledger.forget(&objects.iter().copied().collect(), present, last)?;
         self.recent = RecentEvents::default();
         Ok(())
+    }
+    /// Takes two identities for one thing: `gone` goes, its history and what was done to it are `kept`'s from now on, and
+    /// what was seen last is believed. Gives the number by which it can be undone.
+    ///
+    /// # Errors
+    /// One of them is not remembered; then nothing changes.
+    pub fn merge(&mut self, kept: ObjectId, gone: ObjectId) -> Result<u32, MemoryError> {
+        self.regroup(|draft| regroup::merge(draft, kept, gone))
+    }
+    /// Takes an identity for two things: since a moment it was another one, which gets an id of its own, the history since
+    /// and what was done to it since. Where the old one is since then is unknown. Gives the number by which it can be
+    /// undone, and the new id.
+    ///
+    /// # Errors
+    /// It is not remembered, or not on both sides of the moment; then nothing changes.
+    pub fn split(&mut self, from: ObjectId, since: Moment) -> Result<(u32, ObjectId), MemoryError> {
+        self.regroup(|draft| regroup::split(draft, from, since))
+    }
+    /// Undoes a merge or a split. What was seen since stays with the identity under which it was seen; of a split it comes
+    /// back to the one that is left.
+    ///
+    /// # Errors
+    /// There is none with this number, or it was undone.
+    pub fn undo_regrouping(&mut self, number: u32) -> Result<(), MemoryError> {
+        self.regroup(|draft| regroup::undo(draft, number)).map(drop)
+    }
+    fn regroup<T>(&mut self, change: impl FnOnce(&mut Draft<'_>) -> Result<T, String>) -> Result<T, MemoryError> {
+        let mut draft = self.draft(Source::Agent);
+        let done = change(&mut draft).map_err(MemoryError::Regrouping)?;
+        let (state, events, fault) = (draft.state, draft.events, draft.fault);
+        self.commit(state, events, fault)?;
+        Ok(done)
     }
     /// The objects that a policy forgets, in the order of their ids; see [`AcmMemory::erase`].
     pub fn due(&self, policy: &Policy) -> Vec<ObjectId> {
