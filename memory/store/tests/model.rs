@@ -253,6 +253,34 @@ proptest! {
 }
 
 #[test]
+fn no_block_is_passed_over_that_holds_a_hit() {
+    // Many blocks, and few of the objects among the first ten: bounds decide.
+    let (mut world, words) = World::new(6, 4, 6);
+    let (mut store, mut reference) = (Store::in_memory(), Naive::default());
+    store.commit(std::slice::from_ref(&words), 0).unwrap();
+    reference.commit(&[words], 0);
+    let puts: Vec<Event> = (0..8000).map(|id| world.put(id, 1)).collect();
+    store.commit(&puts, 1).unwrap();
+    reference.commit(&puts, 1);
+    let (state, now) = (store.view(), reference.now());
+    let mut full = 0;
+    for number in 0..400 {
+        let mut query = if number % 2 == 0 { world.scoped() } else { world.unscoped() };
+        let near = world.scoped().near;
+        match number % 8 {
+            1 | 3 => query.near = near,
+            4 => query.region = None,
+            6 => query.categories.clear(),
+            _ => {}
+        }
+        let (found, wanted) = (execute::answer(&state, &query).hits, naive::answer(&now, &query));
+        full += usize::from(wanted.len() == query.most);
+        assert!(found.iter().map(|hit| hit.id).eq(wanted.iter().map(|hit| hit.id)), "{query:?} gives {found:?}");
+    }
+    assert!(full > 200, "{full} questions have more hits than are told");
+}
+
+#[test]
 fn compaction_drops_what_was_superseded_and_keeps_what_was_said_since() {
     let (mut world, words) = World::new(3, 4, 6);
     let disk = FaultDisk::default();
