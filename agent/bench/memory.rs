@@ -15,8 +15,8 @@ pub mod questions;
 
 use super::{BenchResult, Row};
 use crate::{cli::MemoryArgs, statistics::median_and};
-use anyhow::Context;
 use acm_store::{Event, State, Store, testing::worlds::World};
+use anyhow::Context;
 use rustix::time::{ClockId, clock_gettime};
 use std::{path::Path, sync::Arc};
 
@@ -48,7 +48,9 @@ pub fn measure(args: &MemoryArgs) -> anyhow::Result<BenchResult> {
     peers::compare(&mut result);
     match &args.defects {
         Some(path) => defects(path, &mut result)?,
-        None => result.rows.push(Row::skipped("seeded defects", "no --defects: scripts/seeded_bugs.py --json makes the file")),
+        None => result
+            .rows
+            .push(Row::skipped("seeded defects", "no --defects: scripts/seeded_bugs.py --json makes the file")),
     }
     if let Some(path) = &args.plot {
         plot::write(&result, path)?;

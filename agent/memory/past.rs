@@ -19,15 +19,15 @@ pub fn history(dir: &Path, text: &str, as_json: bool) -> anyhow::Result<()> {
     let state = store.view();
     let id = object(text)?;
     let (heads, at) = state.head(id).with_context(|| format!("{text} was never in this memory"))?;
-    let changes = state.history.changes(heads.last[at]);
+    let changes = state.history.changes(heads.of[at].last);
     if as_json {
         println!(
             "{}",
-            json!({"schema": "acm.memory-history/1", "object": text, "born_ns": heads.born[at], "changes": changes})
+            json!({"schema": "acm.memory-history/1", "object": text, "born_ns": heads.of[at].born, "changes": changes})
         );
         return Ok(());
     }
-    println!("{text} is known since {}", when(heads.born[at]));
+    println!("{text} is known since {}", when(heads.of[at].born));
     for change in &changes {
         println!("  {:<14} known {:<14} {}", when(change.valid), when(change.known), what(&state, change));
     }

@@ -161,14 +161,16 @@ impl Store {
         };
         sweep(&mut *disk, manifest).map_err(io_error("what is left over cannot be removed"))?;
         let (mut state, mut document, mut batch) = (State::default(), None, 0);
+        let mut first = manifest.first;
         if let Some(number) = manifest.snapshot {
             let file = snapshot::name(number);
             let map = disk.map(&file).map_err(io_error("the snapshot cannot be read"))?;
-            let found = snapshot::read(Arc::new(map)).map_err(|reason| StoreError::Damaged { file, reason })?;
-            (state, document, batch) = (found.state, Some(found.document), found.batch);
+            if !snapshot::is_of_another_layout(&map) {
+                let found = snapshot::read(Arc::new(map)).map_err(|reason| StoreError::Damaged { file, reason })?;
+                (state, document, batch, first) = (found.state, Some(found.document), found.batch, number);
+            }
         }
         let skip = Place { batch, next: state.next };
-        let first = manifest.snapshot.unwrap_or(manifest.first);
         let log = Log::open(&mut *disk, (manifest.first, first), skip, |first, time, bodies| {
             let mut events = Vec::with_capacity(bodies.len());
             for (number, body) in (first..).zip(bodies) {

@@ -25,7 +25,7 @@ pub fn digest(state: &State) -> u32 {
     let mut add = |text: String| check = crc32c::crc32c_append(check, text.as_bytes());
     for id in state.ids() {
         add(format!("{:?}", state.object(id)));
-        let last = state.head(id).map_or(0, |(heads, at)| heads.last[at]);
+        let last = state.head(id).map_or(0, |(heads, at)| heads.of[at].last);
         add(format!("{:?}", state.history.changes(last)));
     }
     state.relations.forth.iter().for_each(|edge| add(format!("{edge:?}")));
