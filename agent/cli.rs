@@ -544,6 +544,9 @@ pub struct MemoryArgs {
     /// Draw cost against the number of objects into this file.
     #[arg(long, value_name = "FILE.svg")]
     pub plot: Option<PathBuf>,
+    /// What `scripts/seeded_bugs.py --json FILE` found, to stand beside the other figures.
+    #[arg(long, value_name = "FILE")]
+    pub defects: Option<PathBuf>,
 }
 
 /// Arguments of `acm bench perception`.

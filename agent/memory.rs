@@ -19,7 +19,7 @@ use crate::cli::{
     memory::{ForgetArgs, MemoryCommand},
 };
 use acm_concept::ids::ObjectId;
-use acm_memory::{AcmMemory, narrow, open_store, whole_library};
+use acm_memory::{AcmMemory, MemoryError, Policy, narrow, open_store, whole_library};
 use acm_store::{Id, Kind, Op, State, event::Sure};
 use anyhow::Context;
 use serde_json::json;
@@ -35,6 +35,21 @@ pub fn run(command: &MemoryCommand) -> anyhow::Result<Exit> {
         MemoryCommand::Skills { dir, skill, json } => skills::print(dir, skill.as_deref(), *json)?,
         MemoryCommand::At(args) => past::at(args)?,
         MemoryCommand::Forget(args) => forget(args)?,
+        MemoryCommand::Merge { dir, kept, gone } => {
+            let (kept, gone): (ObjectId, ObjectId) = (kept.parse()?, gone.parse()?);
+            let number = opened(dir)?.merge(kept, gone)?;
+            println!("{gone} is {kept}: merge {number}, which `acm memory undo` undoes");
+        }
+        MemoryCommand::Split { dir, object, since } => {
+            let from: ObjectId = object.parse()?;
+            let (number, new) = opened(dir)?.split(from, acm_memory::moment(past::parse(since)?))?;
+            println!("{from} was {new} since then: split {number}, which `acm memory undo` undoes");
+        }
+        MemoryCommand::Undo { dir, number } => {
+            opened(dir)?.undo_regrouping(*number)?;
+            println!("{number} is undone");
+        }
+        MemoryCommand::Compact { dir, keep_runs } => compact(dir, *keep_runs)?,
         MemoryCommand::Verify { dir } => verify(dir)?,
         MemoryCommand::Export { dir, format, out } => export::run(dir, *format, out)?,
     }
@@ -103,8 +118,11 @@ fn forget(args: &ForgetArgs) -> anyhow::Result<()> {
     let (regions, sources) =
         (find(store.state(), Kind::Region, &args.region)?, find(store.state(), Kind::Source, &args.source)?);
     let mut gone: BTreeSet<Id> = args.object.iter().map(|text| object(text)).collect::<anyhow::Result<_>>()?;
-    if gone.is_empty() && regions.is_empty() && sources.is_empty() {
-        anyhow::bail!("nothing is named that should be forgotten: use --object, --region or --source");
+    let policy = Policy { older_than_runs: args.older_than, keep_most: args.keep, below_confidence: args.below };
+    if gone.is_empty() && regions.is_empty() && sources.is_empty() && policy == Policy::default() {
+        anyhow::bail!(
+            "nothing is named that should be forgotten: use --object, --region, --source, --older-than, --keep or --below"
+        );
     }
     // A memory's beliefs are whole objects: one of which a source spoke goes with all that is known of it.
     for (_, event) in store.events()? {
@@ -120,10 +138,30 @@ fn forget(args: &ForgetArgs) -> anyhow::Result<()> {
     }
     drop(store);
     let mut memory = AcmMemory::open(&args.dir, Arc::new(whole_library()?))?;
-    let objects: Vec<ObjectId> = gone.iter().map(|id| ObjectId(u64::from(*id))).collect();
-    memory.erase(&objects)?;
+    let mut objects: BTreeSet<ObjectId> = gone.iter().map(|id| ObjectId(u64::from(*id))).collect();
+    objects.extend(memory.due(&policy));
+    let objects: Vec<ObjectId> = objects.into_iter().collect();
+    if !args.dry_run {
+        memory.erase(&objects)?;
+    }
     let names: Vec<String> = objects.iter().map(ToString::to_string).collect();
-    println!("forgotten: {}", if names.is_empty() { "nothing was there".into() } else { names.join(" ") });
+    let done = if args.dry_run { "would be forgotten" } else { "forgotten" };
+    println!("{done}: {}", if names.is_empty() { "nothing was there".into() } else { names.join(" ") });
+    Ok(())
+}
+
+/// The memory of a folder that is there already.
+fn opened(dir: &Path) -> anyhow::Result<AcmMemory> {
+    if !dir.join(acm_store::manifest::NAME).is_file() {
+        return Err(MemoryError::Missing { path: dir.into() }.into());
+    }
+    Ok(AcmMemory::open(dir, Arc::new(whole_library()?))?)
+}
+
+fn compact(dir: &Path, keep_runs: u32) -> anyhow::Result<()> {
+    let mut memory = opened(dir)?;
+    let done = memory.compact(keep_runs)?;
+    println!("{} events in {} bytes, before {} in {}", done.events.1, done.bytes.1, done.events.0, done.bytes.0);
     Ok(())
 }
 

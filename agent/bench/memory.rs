@@ -16,8 +16,9 @@ pub mod questions;
 use super::{BenchResult, Row};
 use crate::{cli::MemoryArgs, statistics::median_and};
 use acm_store::{Event, State, Store, testing::worlds::World};
+use anyhow::Context;
 use rustix::time::{ClockId, clock_gettime};
-use std::sync::Arc;
+use std::{path::Path, sync::Arc};
 
 /// Rooms and categories of the worlds.
 const ROOMS: usize = 64;
@@ -45,10 +46,39 @@ pub fn measure(args: &MemoryArgs) -> anyhow::Result<BenchResult> {
     let size = sizes.last().copied().unwrap_or_default();
     durable::measure(size, args.common.quick, &mut result)?;
     peers::compare(&mut result);
+    match &args.defects {
+        Some(path) => defects(path, &mut result)?,
+        None => result
+            .rows
+            .push(Row::skipped("seeded defects", "no --defects: scripts/seeded_bugs.py --json makes the file")),
+    }
     if let Some(path) = &args.plot {
         plot::write(&result, path)?;
     }
     Ok(result)
+}
+
+/// Takes over what the script found that puts defects into a copy of the engine.
+fn defects(path: &Path, result: &mut BenchResult) -> anyhow::Result<()> {
+    #[derive(serde::Deserialize)]
+    struct Defect {
+        defect: String,
+        caught: bool,
+    }
+    #[derive(serde::Deserialize)]
+    struct Found {
+        defects: Vec<Defect>,
+    }
+    let text = std::fs::read(path).with_context(|| format!("{} cannot be read", path.display()))?;
+    let found: Found = serde_json::from_slice(&text)
+        .with_context(|| format!("{} is not what scripts/seeded_bugs.py --json writes", path.display()))?;
+    let caught = found.defects.iter().filter(|defect| defect.caught).count() as f64;
+    let values = [("defects", found.defects.len() as f64), ("caught", caught)];
+    result.rows.push(Row { group: Some("defects".into()), ..Row::new("seeded defects", values) });
+    let missed = found.defects.iter().filter(|defect| !defect.caught);
+    result.errors.extend(missed.map(|missed| format!("no test finds the seeded defect `{}`", missed.defect)));
+    result.figure("seeded_bugs_caught", caught);
+    Ok(())
 }
 
 /// A world of so many objects, settled for reading.

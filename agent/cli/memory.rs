@@ -41,8 +41,41 @@ pub enum MemoryCommand {
     },
     /// Tell how everything was at a moment, as it was known at another.
     At(AtArgs),
-    /// Forget objects, regions or sources so that no byte of them stays in the folder.
+    /// Forget objects, regions, sources, or what a policy names, so that no byte of them stays in the folder.
     Forget(ForgetArgs),
+    /// Take two identities for one thing; what was seen last is believed.
+    Merge {
+        /// The folder.
+        dir: PathBuf,
+        /// The identity that stays, such as O3: the one that was known first has its whole past.
+        kept: String,
+        /// The one that goes.
+        gone: String,
+    },
+    /// Take an identity for two things: since a moment it was another one.
+    Split {
+        /// The folder.
+        dir: PathBuf,
+        /// The identity, such as O3.
+        object: String,
+        /// Since when: the run's number and seconds in it, as in 2:31.5.
+        since: String,
+    },
+    /// Undo a merge or a split.
+    Undo {
+        /// The folder.
+        dir: PathBuf,
+        /// Its number, as `merge` and `split` printed it.
+        number: u32,
+    },
+    /// Write the log anew without what nobody asks for any more; what is believed stays.
+    Compact {
+        /// The folder.
+        dir: PathBuf,
+        /// How everything was in so many last runs can still be asked for; of earlier ones only what is believed now.
+        #[arg(long, value_name = "N", default_value_t = 1)]
+        keep_runs: u32,
+    },
     /// Read every byte, check it, and fold the log anew.
     Verify {
         /// The folder.
@@ -148,4 +181,16 @@ pub struct ForgetArgs {
     /// Everything that a source said, such as `camera head`, with the objects that it spoke of.
     #[arg(long, value_name = "WORD")]
     pub source: Vec<String>,
+    /// Objects that were last seen so many runs ago, or longer.
+    #[arg(long, value_name = "RUNS")]
+    pub older_than: Option<u32>,
+    /// All objects but so many, those that were seen last.
+    #[arg(long, value_name = "N")]
+    pub keep: Option<usize>,
+    /// Objects that are less likely than this to exist as described.
+    #[arg(long, value_name = "P")]
+    pub below: Option<f64>,
+    /// Say what would be forgotten, and forget nothing.
+    #[arg(long)]
+    pub dry_run: bool,
 }

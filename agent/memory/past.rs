@@ -19,15 +19,15 @@ pub fn history(dir: &Path, text: &str, as_json: bool) -> anyhow::Result<()> {
     let state = store.view();
     let id = object(text)?;
     let (heads, at) = state.head(id).with_context(|| format!("{text} was never in this memory"))?;
-    let changes = state.history.changes(heads.last[at]);
+    let changes = state.history.changes(heads.of[at].last);
     if as_json {
         println!(
             "{}",
-            json!({"schema": "acm.memory-history/1", "object": text, "born_ns": heads.born[at], "changes": changes})
+            json!({"schema": "acm.memory-history/1", "object": text, "born_ns": heads.of[at].born, "changes": changes})
         );
         return Ok(());
     }
-    println!("{text} is known since {}", when(heads.born[at]));
+    println!("{text} is known since {}", when(heads.of[at].born));
     for change in &changes {
         println!("  {:<14} known {:<14} {}", when(change.valid), when(change.known), what(&state, change));
     }
@@ -66,7 +66,7 @@ pub fn at(args: &AtArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn parse(text: &str) -> anyhow::Result<u64> {
+pub(super) fn parse(text: &str) -> anyhow::Result<u64> {
     let wrong = || format!("`{text}` is no moment: write the run's number and seconds in it, as in 2:31.5");
     let (episode, seconds) = text.split_once(':').with_context(wrong)?;
     let seconds: f64 = seconds.parse().with_context(wrong)?;

@@ -2,21 +2,17 @@
 
 use acm_concept::ids::SkillId;
 use acm_memory::{
-    AcmMemory, Memory, MemoryError, MemoryView,
+    Memory, MemoryView,
     entry::{General, Law, SkillEntry, Transition, TransitionResult},
-    whole_library,
 };
 use anyhow::ensure;
 use serde_json::json;
-use std::{path::Path, sync::Arc};
+use std::path::Path;
 
 /// Prints the entries, or one.
 pub fn print(dir: &Path, wanted: Option<&str>, as_json: bool) -> anyhow::Result<()> {
-    if !dir.join(acm_store::manifest::NAME).is_file() {
-        return Err(MemoryError::Missing { path: dir.into() }.into());
-    }
     let wanted: Option<SkillId> = wanted.map(str::parse).transpose()?;
-    let memory = AcmMemory::open(dir, Arc::new(whole_library()?))?;
+    let memory = super::opened(dir)?;
     let view = memory.view();
     let entries: Vec<&SkillEntry> =
         view.skills().iter().filter(|entry| wanted.is_none_or(|wanted| wanted == entry.id)).collect();

@@ -2,7 +2,7 @@
 //! when the rules that decide are improved. The format is described in docs/memory-format.md.
 
 use crate::{
-    entry::{HistoryEntry, Moment, ObjectEntry, SkillEntry, Transition, TransitionResult},
+    entry::{HistoryEntry, Moment, ObjectEntry, SkillEntry, TaskProgress, Transition, TransitionResult},
     hand::HandFeeling,
 };
 use acm_concept::{
@@ -10,6 +10,7 @@ use acm_concept::{
     literal::{Evidence, Literal},
     object::{GroundedPart, SupportPlane, Visibility},
     pose::Pose,
+    time::Time,
 };
 use serde::{Deserialize, Serialize};
 
@@ -89,8 +90,13 @@ pub enum Change {
         /// Whether they may be rested on again.
         restored: bool,
     },
+    /// Identities were merged or split, or that was undone.
+    Regrouped(Box<Regrouping>),
     /// Some of memory was dropped.
     Forgotten(Forget),
+    /// The log was written anew: the events before this one say what is still believed of objects, transitions and
+    /// skills, and this one the rest.
+    Compacted(Box<Rest>),
     /// Everything dynamic was dropped; ids go on where they were, so that none is ever given twice.
     Wiped(Counters),
 }
@@ -182,6 +188,68 @@ pub struct Glance {
     pub visibility: Vec<(ObjectId, Visibility)>,
 }
 
+/// Identities that were merged or split.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Regrouping {
+    /// Its number in this memory, from 1.
+    pub number: u32,
+    /// What was done.
+    pub what: Regrouped,
+    /// All that it touched, as it was.
+    pub before: Slice,
+    /// The same, as it is from now on.
+    pub after: Slice,
+}
+
+/// What was done to identities.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Regrouped {
+    /// Two were one thing.
+    Merged {
+        /// The identity that stays.
+        kept: ObjectId,
+        /// The one that goes.
+        gone: ObjectId,
+    },
+    /// One was two things.
+    Split {
+        /// The identity that keeps what was before.
+        from: ObjectId,
+        /// The one that has what was since.
+        new: ObjectId,
+        /// Since when.
+        since: Moment,
+    },
+    /// An earlier merge or split was undone.
+    Undone {
+        /// Its number.
+        number: u32,
+    },
+}
+
+/// Some objects and transitions.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Slice {
+    /// Objects whole.
+    pub objects: Vec<Whole>,
+    /// Objects that are not there.
+    pub gone: Vec<ObjectId>,
+    /// Transitions.
+    pub transitions: Vec<Transition>,
+}
+
+/// An object with its history and what is tracked of it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Whole {
+    /// The entry.
+    pub entry: ObjectEntry,
+    /// The rest.
+    pub track: Track,
+}
+
 /// What to drop from memory.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Forget {
@@ -193,6 +261,34 @@ pub struct Forget {
     pub transitions_before: Option<TransitionId>,
     /// Whether to drop skill memory.
     pub skills: bool,
+}
+
+/// What is believed beside objects, transitions and skills.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Rest {
+    /// Where the agent is in its instruction.
+    pub progress: TaskProgress,
+    /// The surface on which things stand.
+    pub support: Option<SupportPlane>,
+    /// Frames of the run that showed something.
+    pub frames_seen: u32,
+    /// The last frame.
+    pub glance: Option<Glance>,
+    /// What the fingers felt last.
+    pub hand: HandFeeling,
+    /// The ids that come next.
+    pub next: Counters,
+    /// Virtual time within the run.
+    pub now: Time,
+    /// Whether memory goes back to the beginning of the run.
+    pub from_start: bool,
+    /// Merges and splits that can be undone.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub regrouped: Vec<Regrouping>,
+    /// How many there were.
+    #[serde(default)]
+    pub regroupings: u32,
 }
 
 /// The ids that come next.

@@ -3,13 +3,14 @@
 //! and what the columns hold are folded from that one log.
 
 use crate::{
+    entry::Moment,
     event::Event,
-    project::{Projector, moment_ns},
+    project::{Projector, mentioned, moment_ns},
     redact::{self, Dropped},
     traits::MemoryError,
 };
 use acm_concept::ids::ObjectId;
-use acm_store::{Store, StoreError, manifest};
+use acm_store::{Store, StoreError, compact::Compacted, manifest};
 use std::{
     collections::BTreeSet,
     path::{Path, PathBuf},
@@ -71,21 +72,68 @@ impl Ledger {
     }
     /// Puts a new log with one batch in the old one's place, so that nothing of the old one is left.
     pub(crate) fn replace(&mut self, events: &[Event]) -> Result<(), MemoryError> {
+        self.rewrite(&[events.to_vec()])
+    }
+    /// Puts a new log with these batches in the old one's place.
+    fn rewrite(&mut self, batches: &[Vec<Event>]) -> Result<(), MemoryError> {
         let mut scratch = acm_store::State::default();
-        let (batch, time) = self.projector.batch(&mut scratch, events, self.documents).map_err(|r| self.record(r))?;
-        self.store.rewrite(&[(time, batch)]).map_err(|error| translate(&self.path, error))?;
+        let mut written = Vec::with_capacity(batches.len());
+        for events in batches {
+            let (batch, time) =
+                self.projector.batch(&mut scratch, events, self.documents).map_err(|r| self.record(r))?;
+            scratch.commit(time);
+            written.push((time, batch));
+        }
+        self.store.rewrite(&written).map_err(|error| translate(&self.path, error))?;
         self.view = self.store.view();
         Ok(())
     }
-    /// Writes the log anew without some objects and what was done to them; gives the events that are left.
-    pub(crate) fn forget(&mut self, gone: &BTreeSet<ObjectId>) -> Result<Vec<Event>, MemoryError> {
+    /// Writes the log anew without some objects and what was done to them; gives what is left, with what `last` makes of
+    /// it behind it. What is left is known since when it was; where no events are kept, since now, as `present` tells it.
+    pub(crate) fn forget<T>(
+        &mut self,
+        gone: &BTreeSet<ObjectId>,
+        present: impl FnOnce() -> Vec<Event>,
+        last: impl FnOnce(&[Event]) -> Result<(T, Event), String>,
+    ) -> Result<T, MemoryError> {
         let mut dropped = Dropped::new(gone);
-        let kept: Vec<Event> = all_events(&self.path, &mut self.store)?
-            .into_iter()
-            .filter_map(|e| redact::event(e, &mut dropped))
-            .collect();
-        self.replace(&kept)?;
-        Ok(kept)
+        let (mut batches, mut known): (Vec<Vec<Event>>, _) = (Vec::new(), None);
+        let told = match self.documents {
+            true => told_events(&self.path, &mut self.store)?,
+            false => present().into_iter().map(|event| (0, event)).collect(),
+        };
+        for (time, event) in told {
+            let Some(event) = redact::event(event, &mut dropped) else { continue };
+            match batches.last_mut() {
+                Some(batch) if known == Some(time) => batch.push(event),
+                _ => batches.push(vec![event]),
+            }
+            known = Some(time);
+        }
+        let kept: Vec<Event> = batches.iter().flatten().cloned().collect();
+        let (result, last) = last(&kept).map_err(|reason| self.record(reason))?;
+        match batches.last_mut() {
+            Some(batch) => batch.push(last),
+            None => batches.push(vec![last]),
+        }
+        self.rewrite(&batches)?;
+        Ok(result)
+    }
+    /// Writes the log anew; of what was before a moment it holds what `digest` makes of the events until then.
+    pub(crate) fn compact(
+        &mut self,
+        horizon: Moment,
+        digest: impl FnOnce(&[Event]) -> Result<Vec<Event>, String>,
+    ) -> Result<Compacted, MemoryError> {
+        let horizon = moment_ns(horizon).map_err(|reason| self.record(reason))?;
+        let base = |before: &[(u64, acm_store::Event)]| {
+            let parsed = (0u64..).zip(before).filter_map(|(number, (_, event))| parse(number, event).transpose());
+            let events = digest(&parsed.collect::<Result<Vec<Event>, String>>()?)?;
+            events.iter().map(document).collect()
+        };
+        let done = self.store.compact(horizon, base).map_err(|error| translate(&self.path, error))?;
+        self.view = self.store.view();
+        Ok(done)
     }
     /// Writes the columns beside the log, so that whoever asks them alone opens them at once.
     pub(crate) fn snapshot(&mut self) -> Result<(), MemoryError> {
@@ -106,10 +154,24 @@ fn parse(number: u64, event: &acm_store::Event) -> Result<Option<Event>, String>
     parsed.map(Some).map_err(|error| format!("record {number} is no event of memory: {error}"))
 }
 
+/// An event that the columns do not follow.
+fn document(event: &Event) -> Result<acm_store::Event, String> {
+    let document = serde_json::to_vec(event).map_err(|error| format!("an event has no JSON: {error}"))?;
+    let mut stored = acm_store::Event::new(moment_ns(event.moment)?, 0, 1.0, Vec::new());
+    stored.about = mentioned(&document).into_iter().take(acm_store::event::MAX_OPS).collect();
+    stored.document = document;
+    Ok(stored)
+}
+
 fn all_events(path: &Path, store: &mut Store) -> Result<Vec<Event>, MemoryError> {
+    Ok(told_events(path, store)?.into_iter().map(|(_, event)| event).collect())
+}
+
+/// All events, each with the time at which it came to be known.
+fn told_events(path: &Path, store: &mut Store) -> Result<Vec<(u64, Event)>, MemoryError> {
     let stored = store.events().map_err(|error| translate(path, error))?;
-    let parsed = (0u64..).zip(&stored).map(|(number, (_, event))| parse(number, event));
-    let parsed: Result<Vec<Option<Event>>, String> = parsed.collect();
+    let parsed = (0u64..).zip(&stored).map(|(number, (known, event))| Ok(parse(number, event)?.map(|e| (*known, e))));
+    let parsed: Result<Vec<Option<(u64, Event)>>, String> = parsed.collect();
     let error = |reason| MemoryError::Record { path: path.into(), record: 0, reason };
     Ok(parsed.map_err(error)?.into_iter().flatten().collect())
 }
@@ -155,6 +217,6 @@ fn translate(path: &Path, error: StoreError) -> MemoryError {
 }
 
 /// The time axis of the engine: episodes follow each other, each with room for 78 hours.
-pub fn store_time(moment: crate::entry::Moment) -> Result<u64, String> {
+pub fn store_time(moment: Moment) -> Result<u64, String> {
     moment_ns(moment)
 }

@@ -3,13 +3,16 @@
 use crate::{
     consolidate,
     draft::Draft,
+    entry::Moment,
     event::{Change, Counters, Event, Forget, Source},
     execute, expect,
+    forgetting::{self, Policy},
     identity::IdentityRule,
     ledger::Ledger,
     observation::{Executed, Grounding, Note, Observation, Verdict},
     observe,
     recent::{Recent, RecentEvents},
+    regroup,
     state::State,
     traits::{Memory, MemoryError, MemoryView},
     view::Snapshot,
@@ -20,6 +23,7 @@ use acm_concept::{
     template::TemplateLibrary,
     time::Time,
 };
+use acm_store::compact::Compacted;
 use std::{path::Path, sync::Arc};
 
 /// Analytic concept-centric memory: object, scene, transition and skill memory over a library of templates.
@@ -98,17 +102,68 @@ impl AcmMemory {
     /// Forgets objects and what was done to them so that no byte of them stays in the folder. What skills learned from
     /// them stays, as numbers without a link; so do words of the instruction.
     pub fn erase(&mut self, objects: &[ObjectId]) -> Result<(), MemoryError> {
-        let kept = self.ledger.forget(&objects.iter().copied().collect())?;
         let next = self.state.next;
-        self.state = fold(&kept).map_err(|(record, reason)| MemoryError::Record {
-            path: self.ledger.path().into(),
-            record,
-            reason,
-        })?;
-        // An id is never given twice.
-        self.state.next = Counters { episode: self.state.next.episode, ..next };
+        let last = |kept: &[Event]| {
+            let mut state = fold(kept).map_err(|(_, reason)| reason)?;
+            // An id is never given twice.
+            state.next = Counters { episode: state.next.episode, ..next };
+            let rest = forgetting::rest(&state);
+            Ok((state, rest))
+        };
+        let present = || forgetting::digest(&self.state);
+        self.state = self.ledger.forget(&objects.iter().copied().collect(), present, last)?;
         self.recent = RecentEvents::default();
         Ok(())
+    }
+    /// Takes two identities for one thing: `gone` goes, its history and what was done to it are `kept`'s from now on, and
+    /// what was seen last is believed. Gives the number by which it can be undone.
+    ///
+    /// # Errors
+    /// One of them is not remembered; then nothing changes.
+    pub fn merge(&mut self, kept: ObjectId, gone: ObjectId) -> Result<u32, MemoryError> {
+        self.regroup(|draft| regroup::merge(draft, kept, gone))
+    }
+    /// Takes an identity for two things: since a moment it was another one, which gets an id of its own, the history since
+    /// and what was done to it since. Where the old one is since then is unknown. Gives the number by which it can be
+    /// undone, and the new id.
+    ///
+    /// # Errors
+    /// It is not remembered, or not on both sides of the moment; then nothing changes.
+    pub fn split(&mut self, from: ObjectId, since: Moment) -> Result<(u32, ObjectId), MemoryError> {
+        self.regroup(|draft| regroup::split(draft, from, since))
+    }
+    /// Undoes a merge or a split. What was seen since stays with the identity under which it was seen; of a split it comes
+    /// back to the one that is left.
+    ///
+    /// # Errors
+    /// There is none with this number, or it was undone.
+    pub fn undo_regrouping(&mut self, number: u32) -> Result<(), MemoryError> {
+        self.regroup(|draft| regroup::undo(draft, number)).map(drop)
+    }
+    fn regroup<T>(&mut self, change: impl FnOnce(&mut Draft<'_>) -> Result<T, String>) -> Result<T, MemoryError> {
+        let mut draft = self.draft(Source::Agent);
+        let done = change(&mut draft).map_err(MemoryError::Regrouping)?;
+        let (state, events, fault) = (draft.state, draft.events, draft.fault);
+        self.commit(state, events, fault)?;
+        Ok(done)
+    }
+    /// The objects that a policy forgets, in the order of their ids; see [`AcmMemory::erase`].
+    pub fn due(&self, policy: &Policy) -> Vec<ObjectId> {
+        forgetting::due(&self.state, policy)
+    }
+    /// Writes the log anew: of the runs before the last `keep_runs` ones it then holds what is believed of them now, with
+    /// histories, transitions and skills, and no longer how that came about. What was so since then can still be asked
+    /// for as it was known then; nothing that is believed changes.
+    ///
+    /// # Errors
+    /// The folder cannot be written, or an entry is larger than an event may be: then the old log stays.
+    pub fn compact(&mut self, keep_runs: u32) -> Result<Compacted, MemoryError> {
+        let first = (self.state.next.episode + 1).saturating_sub(keep_runs);
+        let digest = |before: &[Event]| match before {
+            [] => Ok(Vec::new()),
+            before => fold(before).map(|state| forgetting::digest(&state)).map_err(|(_, reason)| reason),
+        };
+        self.ledger.compact(Moment { episode: first, time: Time::ZERO }, digest)
     }
     /// Writes the engine's columns beside the log, for whoever asks them alone.
     pub fn write_snapshot(&mut self) -> Result<(), MemoryError> {

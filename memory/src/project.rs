@@ -3,7 +3,7 @@
 
 use crate::{
     entry::{Moment, ObjectEntry, Presence},
-    event::{Change, Event, Source},
+    event::{Change, Event, Regrouping, Source},
 };
 use acm_concept::{
     ids::ObjectId,
@@ -71,6 +71,13 @@ impl Projector {
                 state.check(std::slice::from_ref(&define), time)?;
                 state.apply(&define, time);
                 batch.push(define);
+            }
+            if let Change::Regrouped(regrouping) = &event.change {
+                for past in reattributed(state, event.moment, regrouping)? {
+                    state.check(std::slice::from_ref(&past), time)?;
+                    state.apply(&past, time);
+                    batch.push(past);
+                }
             }
             let document = serde_json::to_vec(event).map_err(|error| format!("an event has no JSON: {error}"))?;
             let mut stored = acm_store::Event::new(moment_ns(event.moment)?, source, confidence, ops);
@@ -153,6 +160,11 @@ fn ops(words: &mut Words<'_>, event: &Event) -> Vec<Op> {
             ops
         }
         Change::Object(believed) => object(words, &believed.entry),
+        // Identities that are there already; others were put with their past.
+        Change::Regrouped(regrouping) => {
+            let objects = regrouping.after.objects.iter();
+            objects.flat_map(|whole| object(words, &whole.entry)).take(stored::MAX_OPS).collect()
+        }
         Change::Forgotten(forget) => {
             let ids = forget.objects.iter().filter_map(|id| narrow(*id));
             ids.filter(|id| state.row(*id).is_some()).map(Op::Remove).collect()
@@ -160,6 +172,58 @@ fn ops(words: &mut Words<'_>, event: &Event) -> Vec<Op> {
         Change::Wiped(_) => vec![Op::Clear],
         _ => Vec::new(),
     }
+}
+
+/// The past of regrouped identities, as it is known from now on: reports of earlier moments.
+fn reattributed(state: &State, now: Moment, regrouping: &Regrouping) -> Result<Vec<acm_store::Event>, String> {
+    let mut events = Vec::new();
+    let mut say = |moment: Moment, op: Op| -> Result<(), String> {
+        // What is said of a time beyond this one is said of now.
+        events.push(acm_store::Event::new(moment_ns(moment.min(now))?, 0, 1.0, vec![op]));
+        Ok(())
+    };
+    for id in regrouping.after.gone.iter().filter_map(|id| narrow(*id)).filter(|id| state.row(*id).is_some()) {
+        let of = regrouping.before.objects.iter().find(|whole| narrow(whole.entry.id) == Some(id));
+        let born = of.and_then(|whole| whole.entry.history.first()).map_or(now, |first| first.moment);
+        say(born, Op::Remove(id))?;
+    }
+    for whole in &regrouping.after.objects {
+        let Some(id) = narrow(whole.entry.id) else { continue };
+        let old = regrouping.before.objects.iter().find(|old| old.entry.id == whole.entry.id);
+        let old = old.map_or(&[][..], |old| &old.entry.history);
+        let history = &whole.entry.history;
+        if old == history.as_slice() {
+            continue;
+        }
+        let rotation = |pose: &acm_concept::pose::Pose| vector_part(pose.rotation);
+        let at = |moment: Moment| {
+            let known = history.iter().rev().filter(|entry| entry.moment <= moment);
+            known.filter_map(|entry| entry.place).map(|place| place.pose).next()
+        };
+        if state.row(id).is_none() {
+            let begin = history.first().map_or(now, |first| first.moment);
+            let pose = at(begin).or(whole.entry.pose()).unwrap_or_default();
+            let object = stored::Object {
+                id,
+                category: 0,
+                region: 0,
+                position: pose.translation.as_vec3().to_array(),
+                rotation: rotation(&pose),
+                confidence: whole.entry.confidence as f32,
+                parts: Vec::new(),
+                affordances: Vec::new(),
+                states: Vec::new(),
+            };
+            say(begin, Op::Put(Box::new(object)))?;
+        }
+        let mut moments: Vec<Moment> = old.iter().chain(history).map(|entry| entry.moment).collect();
+        moments.sort();
+        moments.dedup();
+        for (moment, pose) in moments.into_iter().filter_map(|moment| Some((moment, at(moment)?))) {
+            say(moment, Op::Move(id, pose.translation.as_vec3().to_array(), rotation(&pose)))?;
+        }
+    }
+    Ok(events)
 }
 
 /// An id as the engine has it.

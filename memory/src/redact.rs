@@ -104,6 +104,19 @@ pub(crate) fn event(mut event: Event, dropped: &mut Dropped<'_>) -> Option<Event
             });
         }
         Change::Frame(glance) => glance.visibility.retain(|(id, _)| !dropped.has(*id)),
+        // A merge or split in which one took part could not be undone without it: it stays for what it came to.
+        Change::Regrouped(regrouping) => {
+            regrouping.before = crate::event::Slice::default();
+            let after = &mut regrouping.after;
+            after.objects.retain(|whole| !dropped.has(whole.entry.id) && !dropped.speaks_of(whole));
+            after.transitions.retain(|transition| !dropped.speaks_of(transition));
+        }
+        Change::Compacted(rest) => {
+            rest.regrouped.retain(|regrouping| !dropped.speaks_of(regrouping));
+            if let Some(glance) = &mut rest.glance {
+                glance.visibility.retain(|(id, _)| !dropped.has(*id));
+            }
+        }
         Change::Forgotten(forget) => forget.objects.retain(|id| !dropped.has(*id)),
         Change::EpisodeBegan
         | Change::Instructed { .. }

@@ -2,7 +2,7 @@
 
 use crate::{
     entry::{HistoryEntry, Moment, ObjectEntry, Presence, SkillEntry, TaskProgress, Transition},
-    event::{Believed, Change, Counters, Event, Forget, Glance, Track},
+    event::{Believed, Change, Counters, Event, Forget, Glance, Regrouped, Regrouping, Rest, Track},
     hand::HandFeeling,
 };
 use acm_concept::{
@@ -21,6 +21,8 @@ pub const MAX_OBJECTS: usize = 100_000;
 pub const MAX_HISTORY: usize = 4_096;
 /// Most transitions that are kept; the oldest goes first.
 pub const MAX_TRANSITIONS: usize = 100_000;
+/// Most merges and splits that can be undone; the oldest goes first.
+pub const MAX_REGROUPED: usize = 1_000;
 /// Most skill entries.
 pub const MAX_SKILLS: usize = 10_000;
 
@@ -34,6 +36,10 @@ pub struct State {
     pub(crate) skills: Arc<Vec<SkillEntry>>,
     /// Transitions on which no skill may rest.
     pub(crate) taken_back: Arc<BTreeSet<TransitionId>>,
+    /// Merges and splits that can be undone, oldest first.
+    pub(crate) regrouped: Arc<Vec<Regrouping>>,
+    /// How many there were.
+    pub(crate) regroupings: u32,
     pub(crate) progress: TaskProgress,
     pub(crate) support: Option<SupportPlane>,
     pub(crate) frames_seen: u32,
@@ -102,7 +108,9 @@ impl State {
                     };
                 }
             }
+            Change::Regrouped(regrouping) => self.regroup(regrouping),
             Change::Forgotten(forget) => self.forget(forget),
+            Change::Compacted(rest) => self.take_rest(rest),
             Change::Wiped(counters) => {
                 *self = State { next: *counters, now: event.moment.time, ..State::default() };
             }
@@ -129,7 +137,52 @@ impl State {
         self.tracks = Arc::new(kept.collect());
     }
 
-    fn put_object(&mut self, believed: &Believed) {
+    fn regroup(&mut self, regrouping: &Regrouping) {
+        regrouping.after.apply(self);
+        self.regroupings = regrouping.number;
+        let regrouped = Arc::make_mut(&mut self.regrouped);
+        match &regrouping.what {
+            Regrouped::Undone { number } => regrouped.retain(|known| known.number != *number),
+            Regrouped::Merged { .. } | Regrouped::Split { .. } => {
+                if regrouped.len() >= MAX_REGROUPED {
+                    regrouped.remove(0);
+                }
+                regrouped.push(regrouping.clone());
+            }
+        }
+    }
+    pub(crate) fn set_history(&mut self, object: ObjectId, history: Vec<HistoryEntry>) {
+        let at = self.objects.binary_search_by_key(&object, |entry| entry.id);
+        if let Some(entry) = at.ok().and_then(|at| Arc::make_mut(&mut self.objects).get_mut(at)) {
+            entry.history = history;
+        }
+    }
+    pub(crate) fn drop_objects(&mut self, gone: &[ObjectId]) {
+        if gone.is_empty() {
+            return;
+        }
+        Arc::make_mut(&mut self.objects).retain(|entry| !gone.contains(&entry.id));
+        Arc::make_mut(&mut self.tracks).retain(|id, _| !gone.contains(id));
+    }
+    pub(crate) fn set_transitions(&mut self, transitions: &[Transition]) {
+        for transition in transitions {
+            let at = self.transitions.binary_search_by_key(&transition.id, |known| known.id);
+            if let Some(known) = at.ok().and_then(|at| Arc::make_mut(&mut self.transitions).get_mut(at)) {
+                *known = transition.clone();
+            }
+        }
+    }
+
+    fn take_rest(&mut self, rest: &Rest) {
+        self.progress.clone_from(&rest.progress);
+        (self.support, self.frames_seen, self.hand) = (rest.support, rest.frames_seen, rest.hand);
+        self.glance.clone_from(&rest.glance);
+        (self.next, self.now, self.from_start) = (rest.next, rest.now, rest.from_start);
+        self.regrouped = Arc::new(rest.regrouped.clone());
+        self.regroupings = rest.regroupings;
+    }
+
+    pub(crate) fn put_object(&mut self, believed: &Believed) {
         let id = believed.entry.id;
         let objects = Arc::make_mut(&mut self.objects);
         let at = match objects.binary_search_by_key(&id, |entry| entry.id) {
@@ -153,7 +206,13 @@ impl State {
                 last.verified |= entry.verified;
             }
         }
-        Arc::make_mut(&mut self.tracks).insert(id, believed.track.clone());
+        let tracks = Arc::make_mut(&mut self.tracks);
+        // An object of which nothing is tracked has no track, however that came about.
+        if believed.track == Track::default() {
+            tracks.remove(&id);
+        } else {
+            tracks.insert(id, believed.track.clone());
+        }
         self.next.object = self.next.object.max(id.0 + 1);
     }
 

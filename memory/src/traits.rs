@@ -70,6 +70,9 @@ pub enum MemoryError {
     /// A transition that memory does not know.
     #[error("there is no transition {0}")]
     UnknownTransition(TransitionId),
+    /// Identities that cannot be merged, split or undone so.
+    #[error("{0}")]
+    Regrouping(String),
     /// A skill that memory does not know.
     #[error("there is no skill {0}")]
     UnknownSkill(SkillId),

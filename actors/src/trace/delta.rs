@@ -128,7 +128,7 @@ impl Deltas {
 
     fn delta(&mut self, seq: u64, number: u64, event: Event, view: &dyn MemoryView) -> Delta {
         let (change, object, before, after) = self.change(&event.change, view);
-        self.turned |= matches!(change, "instructed" | "subtask-done" | "forgotten" | "wiped");
+        self.turned |= matches!(change, "instructed" | "subtask-done" | "forgotten" | "regrouped" | "wiped");
         let Event { moment, source, evidence, .. } = event;
         Delta { seq, event: number, moment, source, evidence, change, object, before, after }
     }
@@ -195,6 +195,14 @@ impl Deltas {
                 let before = json!(forget.objects);
                 self.reread(view);
                 ("forgotten", None, before, json!(forget))
+            }
+            Change::Regrouped(regrouping) => {
+                self.reread(view);
+                ("regrouped", None, Value::Null, json!({ "number": regrouping.number, "what": regrouping.what }))
+            }
+            Change::Compacted(_) => {
+                self.reread(view);
+                ("compacted", None, Value::Null, Value::Null)
             }
             Change::Wiped(_) => {
                 let before = json!(std::mem::take(&mut self.objects).into_keys().collect::<Vec<_>>());

@@ -11,7 +11,7 @@ use crate::{
 use acm_concept::{
     ids::TransitionId,
     literal::Term,
-    object::{Observability, ParameterEstimate},
+    object::{Observability, ParameterEstimate, Visibility},
     skill::FailureCause,
     template::TemplateLibrary,
     time::Time,
@@ -81,19 +81,32 @@ fn says(predicate: &str, object: ObjectId, holds: bool) -> Literal {
     if holds { literal } else { literal.negate() }
 }
 
-/// A run before a door: two looks, then the hand feels its handle.
-fn meet(memory: &mut AcmMemory, number: u64, door: &Door) -> ObjectId {
+fn begin(memory: &mut AcmMemory) {
     memory.note(&Note::EpisodeBegan).unwrap();
     memory.note(&Note::Instructed { time: Time::ZERO, text: "open the door".into() }).unwrap();
-    let thing = door.thing().at(5.0 * number as f64, 0.0, 0.0);
-    let mut id = None;
-    for view in 0..2 {
-        let seconds = 0.5 + f64::from(view);
-        let seen =
-            look(memory, 2 * number + u64::from(view as u8), seconds, &[thing.clone()], &[], &open_hand(seconds));
-        id = seen.unwrap().resolved.first().map(|resolved| resolved.object);
+}
+
+/// All doors of a corridor are seen, twice. They are then the objects 1, 2, and so on.
+fn walk_past(memory: &mut AcmMemory, doors: &[Door]) {
+    begin(memory);
+    let things: Vec<Thing> =
+        (0u32..).zip(doors).map(|(n, door)| door.thing().at(2.0 * f64::from(n), 0.0, 0.0)).collect();
+    for view in 0..2u8 {
+        let seen = look(memory, view.into(), view.into(), &things, &[], &open_hand(view.into())).unwrap();
+        let ids = seen.resolved.iter().map(|resolved| resolved.object.0);
+        assert!(ids.eq(1..=doors.len() as u64), "every door is an object of its own");
     }
-    let id = id.unwrap();
+}
+
+/// A run before a door: a look, then the hand feels its handle.
+fn meet(memory: &mut AcmMemory, number: u32, door: &Door) -> ObjectId {
+    begin(memory);
+    let id = ObjectId(u64::from(number) + 1);
+    let others = memory.view().objects().iter().map(|entry| entry.id).filter(|other| *other != id).collect::<Vec<_>>();
+    let others: Vec<_> = others.into_iter().map(|other| (other, Visibility::OutOfView, 0.0)).collect();
+    let thing = door.thing().at(2.0 * f64::from(number), 0.0, 0.0);
+    let seen = look(memory, 10 + u64::from(number), 1.0, &[thing], &others, &open_hand(1.0)).unwrap();
+    assert_eq!(seen.resolved[0].object, id);
     let mut touched = report(&*memory.view(), "close", id, 4.0).unwrap();
     touched.report.invocation.skill = "unlatch".into();
     touched.report.invocation.kind = "press-down".into();
@@ -137,27 +150,33 @@ fn skill(memory: &AcmMemory) -> SkillEntry {
     memory.view().skills().iter().find(|entry| entry.skill == "open").unwrap().clone()
 }
 
-/// Fifty drawn doors, the last of which opens.
-fn fifty(memory: &mut AcmMemory, seed: u64) -> Vec<(Door, TransitionId, bool)> {
+/// Fifty drawn doors, the last of which opens, and behind them three that nobody touches.
+fn corridor(seed: u64) -> (Vec<Door>, ChaCha8Rng) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let mut done = Vec::new();
-    for number in 0..50 {
-        let mut door = Door::draw(&mut rng);
-        if number == 49 {
-            (door.is_latched, door.slips) = (false, false);
-        }
-        let id = meet(memory, number, &door);
-        let (transition, went_well) = open(memory, id, &door, &mut rng);
-        done.push((door, transition, went_well));
+    let mut doors: Vec<Door> = (0..53).map(|_| Door::draw(&mut rng)).collect();
+    (doors[49].is_latched, doors[49].slips) = (false, false);
+    for (door, latched) in doors[50..].iter_mut().zip([Some(true), Some(false), None]) {
+        (door.latch_is_felt, door.is_latched) = (latched.is_some(), latched.unwrap_or_default());
     }
-    done
+    (doors, rng)
+}
+
+fn try_all(memory: &mut AcmMemory, doors: &[Door], rng: &mut ChaCha8Rng) -> Vec<(Door, TransitionId, bool)> {
+    let one = |(number, door): (u32, &Door)| {
+        let id = meet(memory, number, door);
+        let (transition, went_well) = open(memory, id, door, rng);
+        (door.clone(), transition, went_well)
+    };
+    (0..).zip(doors).map(one).collect()
 }
 
 #[test]
 fn fifty_door_openings_become_one_skill_that_carries_over() {
     for seed in 0..5 {
         let mut memory = AcmMemory::in_memory(Arc::clone(&DOORS));
-        let done = fifty(&mut memory, seed);
+        let (doors, mut rng) = corridor(seed);
+        walk_past(&mut memory, &doors);
+        let done = try_all(&mut memory, &doors[..50], &mut rng);
         let entry = skill(&memory);
         let opened = done.iter().filter(|(.., went_well)| *went_well).count();
         assert_eq!((entry.tries, entry.successes as usize), (50, opened));
@@ -180,7 +199,7 @@ fn fifty_door_openings_become_one_skill_that_carries_over() {
         let widths = done.iter().filter(|d| d.2).map(|(d, ..)| d.geometry["width"]);
         let (low, high) = widths.fold((f64::MAX, 0.0f64), |(low, high), w| (low.min(w), high.max(w)));
         let found = general.target.parameters.iter().find(|(name, ..)| name == "width").unwrap();
-        // Two noiseless views: the fused value is what was shown.
+        // Noiseless views: the fused value is what was shown.
         assert!((found.1 - low).abs() < 1e-9 && (found.2 - high).abs() < 1e-9, "{found:?}, not {low} to {high}");
 
         // Phi: the radius follows from two sizes, the grip from one, the swing from none.
@@ -199,10 +218,8 @@ fn fifty_door_openings_become_one_skill_that_carries_over() {
         assert!(worst < 0.004 && by_mean > 0.1, "seed {seed}: {worst} m by the law, {by_mean} m by the mean");
 
         // Doors that were never opened: what is felt of them counts.
-        let chances = [Some(true), Some(false), None].map(|latched| {
-            let mut door = Door::draw(&mut rng);
-            (door.latch_is_felt, door.is_latched) = (latched.is_some(), latched.unwrap_or_default());
-            let id = meet(&mut memory, 100 + u64::from(latched.is_some()) + u64::from(door.is_latched), &door);
+        let chances = [50, 51, 52].map(|number| {
+            let id = meet(&mut memory, number, &doors[number as usize]);
             let candidate = opening(&memory, id);
             assert_eq!(memory.view().predict(&candidate).success, candidate.success);
             candidate.success
@@ -218,13 +235,14 @@ fn what_goes_with_failure_by_accident_is_no_condition() {
     let mut wrong = 0;
     for seed in 0..10 {
         let mut memory = AcmMemory::in_memory(Arc::clone(&DOORS));
-        let mut rng = ChaCha8Rng::seed_from_u64(50 + seed);
-        for number in 0..30 {
-            let mut door = Door::draw(&mut rng);
-            (door.is_latched, door.slips) = (false, rng.random_bool(0.3) && number < 29);
-            let id = meet(&mut memory, number, &door);
-            open(&mut memory, id, &door, &mut rng);
+        let (mut doors, mut rng) = corridor(50 + seed);
+        doors.truncate(30);
+        for door in &mut doors {
+            (door.is_latched, door.slips) = (false, rng.random_bool(0.3));
         }
+        doors[29].slips = false;
+        walk_past(&mut memory, &doors);
+        try_all(&mut memory, &doors, &mut rng);
         wrong += skill(&memory).general.unwrap().learned.len();
     }
     assert_eq!(wrong, 0);
@@ -234,21 +252,21 @@ fn what_goes_with_failure_by_accident_is_no_condition() {
 fn a_consolidation_can_be_undone_and_done_again() {
     let folder = tempfile::tempdir().unwrap();
     let mut memory = AcmMemory::open(folder.path(), Arc::clone(&DOORS)).unwrap();
-    let mut rng = ChaCha8Rng::seed_from_u64(3);
-    let mut before = Vec::new();
-    let mut last = Vec::new();
-    for number in 0..12 {
-        let mut door = Door::draw(&mut rng);
+    let (mut doors, mut rng) = corridor(3);
+    doors.truncate(12);
+    walk_past(&mut memory, &doors);
+    let (mut before, mut last) = (Vec::new(), Vec::new());
+    for (number, door) in (0..).zip(&mut doors) {
         (door.is_latched, door.slips) = (number % 4 == 3, false);
         before = memory.view().skills().to_vec();
-        let id = meet(&mut memory, number, &door);
-        let (first, went_well) = open(&mut memory, id, &door, &mut rng);
+        let id = meet(&mut memory, number, door);
+        let (first, went_well) = open(&mut memory, id, door, &mut rng);
         last = vec![first];
         if number == 11 {
             // The same run tries again once the latch gives.
             assert!(!went_well);
             door.is_latched = false;
-            last.push(open(&mut memory, id, &door, &mut rng).0);
+            last.push(open(&mut memory, id, door, &mut rng).0);
         }
     }
     let (after, id) = (memory.view().skills().to_vec(), skill(&memory).id);

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::{
-    MemoryError,
+    MemoryError, Policy,
     entry::Presence,
     ledger::FORMAT,
     memory::AcmMemory,
@@ -111,6 +111,19 @@ fn states(dir: &Path, steps: &[Step]) -> Vec<(u64, crate::state::State)> {
     states
 }
 
+/// All objects as of some moments of the last runs, each as it was known at some of them.
+fn since(memory: &AcmMemory, run: u32, keep_runs: u32) -> Vec<Option<acm_store::history::Past>> {
+    let mut moments = vec![u64::MAX];
+    for run in (run + 1).saturating_sub(keep_runs)..=run {
+        let at = |seconds: u32| crate::entry::Moment { episode: run, time: Time::from_seconds(seconds.into()) };
+        moments.extend((0..20).map(|half| crate::store_time(at(2 * half)).unwrap()));
+    }
+    let columns = memory.columns();
+    let ids = 0..=memory.state().next.object as u32;
+    let pairs = || moments.iter().flat_map(|valid| moments.iter().map(move |known| (*valid, *known)));
+    ids.flat_map(|id| pairs().map(move |(v, k)| columns.as_of(id, v, k).filter(|past| past.there))).collect()
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
     #[test]
@@ -119,6 +132,37 @@ proptest! {
         let states = states(dir.path(), &steps);
         let reopened = open(dir.path()).unwrap();
         prop_assert_eq!(reopened.state(), &states.last().unwrap().1);
+    }
+
+    #[test]
+    fn a_compacted_log_comes_to_the_same(steps in steps(40), keep_runs in 0..3u32) {
+        let dir = tempfile::tempdir().unwrap();
+        let mut memory = open(dir.path()).unwrap();
+        for (number, step) in steps.iter().enumerate() {
+            perform(&mut memory, number, step).unwrap();
+        }
+        let (state, run) = (memory.state().clone(), memory.state().next.episode);
+        let known = since(&memory, run, keep_runs);
+        let done = memory.compact(keep_runs).unwrap();
+        prop_assert!(done.bytes.1 <= done.bytes.0, "{:?}", done);
+        prop_assert_eq!(memory.state(), &state);
+        prop_assert_eq!(&since(&memory, run, keep_runs), &known);
+        drop(memory);
+        let mut memory = open(dir.path()).unwrap();
+        prop_assert_eq!(memory.state(), &state);
+        prop_assert_eq!(&since(&memory, run, keep_runs), &known);
+        // It goes on, and can be forgotten from.
+        for (number, step) in steps.iter().enumerate().take(8) {
+            perform(&mut memory, 100 + number, step).unwrap();
+        }
+        let gone: Vec<_> = memory.view().objects().iter().take(1).map(|entry| entry.id).collect();
+        memory.erase(&gone).unwrap();
+        memory.compact(0).unwrap();
+        let left = memory.state().clone();
+        prop_assert!(gone.iter().all(|id| left.object(*id).is_none()));
+        drop(memory);
+        let again = open(dir.path()).unwrap();
+        prop_assert_eq!(again.state(), &left);
     }
 
     #[test]
@@ -138,10 +182,12 @@ fn check_cut(dir: &Path, states: &[(u64, crate::state::State)], cut: u64) {
     let empty = (BLOCK, crate::state::State::default());
     let (end, expected) = states.iter().rev().find(|(end, _)| *end <= cut).unwrap_or(&empty);
     // A commit that lost but the zeros behind it is whole.
-    let padded = states.iter().find(|(end, _)| *end > cut && end - cut < BLOCK).filter(|(_, s)| reopened.state() == s);
+    let length = fs::metadata(&log).unwrap().len();
+    let padded = states.iter().find(|(end, _)| *end > cut && end - cut < BLOCK);
+    let padded = padded.filter(|(end, state)| reopened.state() == state && length == *end);
     let (end, expected) = padded.map_or((end, expected), |(end, state)| (end, state));
     assert_eq!(reopened.state(), expected, "cut at {cut}");
-    assert_eq!(fs::metadata(&log).unwrap().len(), *end, "the torn tail is gone");
+    assert_eq!(length, *end, "the torn tail is gone");
     drop(reopened);
     fs::write(&log, whole).unwrap();
 }
@@ -377,4 +423,44 @@ fn check_columns(memory: &AcmMemory) {
         let past = columns.as_of(id, u64::MAX, u64::MAX).unwrap();
         assert_eq!((past.position, past.there), (object.position, true));
     }
+}
+
+#[test]
+fn a_policy_forgets_by_age_count_and_confidence() {
+    let mut memory = memory();
+    let things = [
+        Thing::mat(0.1, 0.1).at(0.0, 0.0, 0.0),
+        Thing::can(0.03, 0.1).at(0.3, 0.0, 0.0),
+        Thing::button(0.02, 0.02).at(0.0, 0.3, 0.0),
+        Thing::block([0.04, 0.03, 0.04]).at(0.3, 0.3, 0.0),
+    ];
+    // One thing less a run: the camera looks past it.
+    for run in 0..4usize {
+        let past: Vec<_> = (1..=run as u64).map(|id| (ObjectId(id), Visibility::OutOfView, 0.0)).collect();
+        for frame in 0..3 {
+            look(&mut memory, 10 * run as u64 + frame, 1.0, &things[run..], &past, &open_hand(1.0)).unwrap();
+        }
+        if run < 3 {
+            begin(&mut memory).unwrap();
+        }
+    }
+    let ids = |numbers: &[u64]| numbers.iter().map(|number| ObjectId(*number)).collect::<Vec<_>>();
+    let none = Policy::default();
+    let seen: Vec<_> = memory.view().objects().iter().map(|o| (o.id.0, o.last_seen.episode)).collect();
+    assert_eq!(seen, [(1, 1), (2, 2), (3, 3), (4, 4)]);
+    assert_eq!(memory.due(&none), []);
+    assert_eq!(memory.due(&Policy { older_than_runs: Some(2), ..none }), ids(&[1, 2]));
+    assert_eq!(memory.due(&Policy { keep_most: Some(1), ..none }), ids(&[1, 2, 3]));
+    assert_eq!(memory.due(&Policy { keep_most: Some(9), ..none }), []);
+    let confidence = |id: u64| object(&memory, ObjectId(id)).confidence;
+    let between = 0.5 * (confidence(1) + confidence(2));
+    assert_eq!(memory.due(&Policy { below_confidence: Some(between), ..none }), ids(&[1]));
+    // What is in the hand stays, and counts.
+    let held = report(&*memory.view(), "pick", ObjectId(4), 2.0).unwrap().holding();
+    memory.record(&held).unwrap();
+    assert_eq!(memory.due(&Policy { keep_most: Some(2), below_confidence: Some(2.0), ..none }), ids(&[1, 2, 3]));
+    assert_eq!(memory.due(&Policy { keep_most: Some(2), ..none }), ids(&[1, 2]));
+    let due = memory.due(&Policy { older_than_runs: Some(1), ..none });
+    memory.erase(&due).unwrap();
+    assert_eq!(memory.view().objects().len(), 1);
 }

@@ -7,6 +7,7 @@ mod episodes;
 mod identity;
 mod joints;
 mod places;
+mod regroup;
 mod retrieval;
 mod staplers;
 mod story;

@@ -167,21 +167,21 @@ pub fn coarse(confidence: f32) -> u8 {
 
 /// Writes an event's body.
 pub fn write(event: &Event, out: &mut Vec<u8>) {
-    out.extend(event.valid.to_le_bytes());
-    out.extend(event.source.to_le_bytes());
+    out.extend_from_slice(&event.valid.to_le_bytes());
+    out.extend_from_slice(&event.source.to_le_bytes());
     out.push(coarse(event.confidence));
     out.push(event.evidence.len().min(MAX_EVIDENCE) as u8);
     out.extend((event.ops.len().min(MAX_OPS) as u16).to_le_bytes());
     out.extend((event.about.len().min(MAX_OPS) as u16).to_le_bytes());
     for evidence in event.evidence.iter().take(MAX_EVIDENCE) {
         out.push(evidence.series);
-        out.extend(evidence.number.to_le_bytes());
+        out.extend_from_slice(&evidence.number.to_le_bytes());
     }
     for op in event.ops.iter().take(MAX_OPS) {
         write_op(op, out);
     }
     for id in event.about.iter().take(MAX_OPS) {
-        out.extend(id.to_le_bytes());
+        out.extend_from_slice(&id.to_le_bytes());
     }
     out.extend_from_slice(&event.document);
 }
@@ -195,14 +195,14 @@ fn write_op(op: &Op, out: &mut Vec<u8>) {
         }
         Op::IsA(child, parent) => {
             out.push(2);
-            out.extend(child.to_le_bytes());
-            out.extend(parent.to_le_bytes());
+            out.extend_from_slice(&child.to_le_bytes());
+            out.extend_from_slice(&parent.to_le_bytes());
         }
         Op::Put(object) => {
             out.push(3);
-            out.extend(object.id.to_le_bytes());
-            out.extend(object.category.to_le_bytes());
-            out.extend(object.region.to_le_bytes());
+            out.extend_from_slice(&object.id.to_le_bytes());
+            out.extend_from_slice(&object.category.to_le_bytes());
+            out.extend_from_slice(&object.region.to_le_bytes());
             floats(&object.position, out);
             floats(&object.rotation, out);
             floats(&[object.confidence], out);
@@ -213,47 +213,47 @@ fn write_op(op: &Op, out: &mut Vec<u8>) {
         }
         Op::Move(id, position, rotation) => {
             out.push(4);
-            out.extend(id.to_le_bytes());
+            out.extend_from_slice(&id.to_le_bytes());
             floats(position, out);
             floats(rotation, out);
         }
         Op::Region(id, region) => {
             out.push(5);
-            out.extend(id.to_le_bytes());
-            out.extend(region.to_le_bytes());
+            out.extend_from_slice(&id.to_le_bytes());
+            out.extend_from_slice(&region.to_le_bytes());
         }
         Op::State(id, state, sure) => {
             out.push(6);
-            out.extend(id.to_le_bytes());
-            out.extend(state.to_le_bytes());
+            out.extend_from_slice(&id.to_le_bytes());
+            out.extend_from_slice(&state.to_le_bytes());
             out.push(*sure as u8);
         }
         Op::Fluent(id, fluent, value) => {
             out.push(7);
-            out.extend(id.to_le_bytes());
-            out.extend(fluent.to_le_bytes());
-            out.extend(value.to_le_bytes());
+            out.extend_from_slice(&id.to_le_bytes());
+            out.extend_from_slice(&fluent.to_le_bytes());
+            out.extend_from_slice(&value.to_le_bytes());
         }
         Op::Relate(id, relation, other, sure) => {
             out.push(8);
-            out.extend(id.to_le_bytes());
-            out.extend(relation.to_le_bytes());
-            out.extend(other.to_le_bytes());
+            out.extend_from_slice(&id.to_le_bytes());
+            out.extend_from_slice(&relation.to_le_bytes());
+            out.extend_from_slice(&other.to_le_bytes());
             out.push(*sure as u8);
         }
         Op::Confidence(id, confidence) => {
             out.push(9);
-            out.extend(id.to_le_bytes());
+            out.extend_from_slice(&id.to_le_bytes());
             floats(&[*confidence], out);
         }
         Op::Remove(id) => {
             out.push(10);
-            out.extend(id.to_le_bytes());
+            out.extend_from_slice(&id.to_le_bytes());
         }
         Op::Searched(region, category, share) => {
             out.push(11);
-            out.extend(region.to_le_bytes());
-            out.extend(category.to_le_bytes());
+            out.extend_from_slice(&region.to_le_bytes());
+            out.extend_from_slice(&category.to_le_bytes());
             floats(&[*share], out);
         }
         Op::Clear => out.push(12),
@@ -267,13 +267,12 @@ pub fn read(bytes: &[u8]) -> Option<Event> {
     let source = input.word()?;
     let [confidence, evidence] = input.take()?;
     let (ops, about) = (input.word()?, input.word()?);
-    let evidence = (0..evidence).map(|_| {
+    let evidence = list(evidence.into(), &mut input, |input| {
         let [series] = input.take()?;
         Some(Evidence { series, number: u64::from_le_bytes(input.take()?) })
-    });
-    let evidence = evidence.collect::<Option<Vec<_>>>()?;
-    let ops = (0..ops).map(|_| read_op(&mut input)).collect::<Option<Vec<_>>>()?;
-    let about = (0..about).map(|_| input.id()).collect::<Option<Vec<_>>>()?;
+    })?;
+    let ops = list(ops, &mut input, read_op)?;
+    let about = list(about, &mut input, |input| input.id())?;
     Some(Event {
         valid,
         source,
@@ -283,6 +282,15 @@ pub fn read(bytes: &[u8]) -> Option<Event> {
         about,
         document: input.0.to_vec(),
     })
+}
+
+/// So many values. Room is made for what the bytes that are left can hold, not for what they say.
+fn list<T>(count: u16, input: &mut Input<'_>, mut read: impl FnMut(&mut Input<'_>) -> Option<T>) -> Option<Vec<T>> {
+    let mut all = Vec::with_capacity(usize::from(count).min(input.0.len()));
+    for _ in 0..count {
+        all.push(read(input)?);
+    }
+    Some(all)
 }
 
 struct Input<'a>(&'a [u8]);
@@ -323,6 +331,7 @@ impl<'a> Input<'a> {
     }
 }
 
+#[inline]
 fn read_op(input: &mut Input<'_>) -> Option<Op> {
     let [tag] = input.take()?;
     Some(match tag {

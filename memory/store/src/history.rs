@@ -199,34 +199,66 @@ impl History {
         self.deltas.len() - self.sorted > 65_536.max(self.sorted / 2)
     }
     /// Lays the changes of each object side by side, so that reading a chain touches a few cache lines. `last` are the ends
-    /// of all chains; they are set to where they are then.
+    /// of all chains; they are set to where they are then. A chain only leads to earlier changes, so that two passes in
+    /// the order of the changes do, and none waits for the change before it.
     pub fn sort<'a>(&mut self, last: impl Iterator<Item = &'a mut u32>) {
-        let mut sorted = History { commits: std::mem::take(&mut self.commits), ..History::default() };
-        let (mut aside, mut chain) = (BTreeMap::new(), Vec::new());
-        let mut deltas = Vec::with_capacity(self.deltas.len());
-        let mut wide = Vec::with_capacity(self.wide.len());
-        for end in last.filter(|end| **end > 0) {
-            chain.clear();
-            chain.extend(self.chain(*end));
-            let mut before = 0;
-            for (index, delta) in chain.iter().rev() {
-                let mut delta = Delta { before, ..**delta };
-                if delta.value & WIDE != 0 && delta.key != CONFIDENCE {
-                    wide.push(self.value(&delta));
-                    delta.value = WIDE | (wide.len() - 1) as u32;
-                }
-                if let Some(moment) = self.aside.get(index) {
-                    aside.insert(deltas.len() as u32, *moment);
-                }
-                deltas.push(delta);
-                before = deltas.len() as u32;
+        const NOBODY: u32 = u32::MAX;
+        let ends: Vec<&mut u32> = last.filter(|end| **end > 0).collect();
+        let deltas: Vec<Delta> = self.deltas.iter().copied().collect();
+        // Whose each change is, and from where on its chain and its wide values lie.
+        let mut owner = vec![NOBODY; deltas.len()];
+        let mut chains = vec![(0u32, 0u32); ends.len()];
+        for (chain, end) in (0u32..).zip(&ends) {
+            if let Some(owner) = owner.get_mut(**end as usize - 1) {
+                *owner = chain;
             }
-            *end = before;
         }
-        sorted.sorted = deltas.len();
-        (sorted.deltas, sorted.wide) = (Grown::of(Run::Owned(deltas)), Grown::of(Run::Owned(wide)));
-        sorted.aside = Arc::new(aside);
-        *self = sorted;
+        let points_aside = |delta: &Delta| delta.value & WIDE != 0 && delta.key != CONFIDENCE;
+        for (at, delta) in deltas.iter().enumerate().rev() {
+            let chain = owner[at];
+            let Some((count, wide)) = chains.get_mut(chain as usize) else { continue };
+            *count += 1;
+            *wide += u32::from(points_aside(delta));
+            if let Some(owner) = (delta.before as usize).checked_sub(1).and_then(|before| owner.get_mut(before)) {
+                *owner = chain;
+            }
+        }
+        let (mut count, mut wides) = (0, 0);
+        for chain in &mut chains {
+            let (length, wide) = *chain;
+            *chain = (count, wides);
+            (count, wides) = (count + length, wides + wide);
+        }
+        let starts: Vec<u32> = chains.iter().map(|(start, _)| *start).collect();
+        let mut sorted: Vec<Delta> = vec![Zeroable::zeroed(); count as usize];
+        let mut wide = vec![[0u32; 3]; wides as usize];
+        for (at, delta) in deltas.iter().enumerate() {
+            let chain = owner[at] as usize;
+            let (Some((next, next_wide)), Some(start)) = (chains.get_mut(chain), starts.get(chain)) else { continue };
+            let before = if next == start { 0 } else { *next };
+            let mut delta = Delta { before, ..*delta };
+            if points_aside(&delta)
+                && let Some(place) = wide.get_mut(*next_wide as usize)
+            {
+                *place = self.value(&delta);
+                delta.value = WIDE | *next_wide;
+                *next_wide += 1;
+            }
+            if let Some(place) = sorted.get_mut(*next as usize) {
+                *place = delta;
+            }
+            owner[at] = *next;
+            *next += 1;
+        }
+        let moved = |(index, moment): (&u32, &Nanos)| {
+            owner.get(*index as usize).filter(|place| **place != NOBODY).map(|place| (*place, *moment))
+        };
+        self.aside = Arc::new(self.aside.iter().filter_map(moved).collect());
+        for (end, (next, _)) in ends.into_iter().zip(&chains) {
+            *end = *next;
+        }
+        self.sorted = sorted.len();
+        (self.deltas, self.wide) = (Grown::of(Run::Owned(sorted)), Grown::of(Run::Owned(wide)));
     }
     /// The changes of a chain, latest known first, with their indices.
     pub fn chain(&self, last: u32) -> impl Iterator<Item = (u32, &Delta)> {

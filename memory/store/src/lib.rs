@@ -14,9 +14,11 @@
 //! | [`relation`], [`region`] | what is related to what; what was searched when |
 //! | [`query`], [`execute`], [`explain`] | what can be asked, how it is answered, and why so |
 //! | [`condition`], [`fork`] | what holds: yes, no or unknown; what would hold |
-//! | [`snapshot`], [`store`], [`forget`] | one writer, readers that never wait, and what must leave no byte behind |
+//! | [`snapshot`], [`store`] | one writer, readers that never wait |
+//! | [`forget`], [`compact`] | what must leave no byte behind, and what nobody will ask for |
 
 pub mod block;
+pub mod compact;
 pub mod condition;
 pub mod cow;
 pub mod disk;

@@ -64,7 +64,7 @@ impl Batch {
     /// Ends a part of the batch; another follows that is written with it.
     pub fn mark(&mut self, next: u64, time: Nanos) {
         self.before = self.events;
-        let fits = record(MARK, next, |out| out.extend(time.to_le_bytes()), &mut self.bytes);
+        let fits = record(MARK, next, |out| out.extend_from_slice(&time.to_le_bytes()), &mut self.bytes);
         debug_assert!(fits, "a mark has a fixed size below the limit");
     }
     /// Ends the batch.
@@ -72,10 +72,10 @@ impl Batch {
         let events = std::mem::take(&mut self.events);
         self.before = 0;
         let body = |out: &mut Vec<u8>| {
-            out.extend(batch.to_le_bytes());
-            out.extend(next.to_le_bytes());
-            out.extend(time.to_le_bytes());
-            out.extend(events.to_le_bytes());
+            out.extend_from_slice(&batch.to_le_bytes());
+            out.extend_from_slice(&next.to_le_bytes());
+            out.extend_from_slice(&time.to_le_bytes());
+            out.extend_from_slice(&events.to_le_bytes());
         };
         let fits = record(COMMIT, next, body, &mut self.bytes);
         debug_assert!(fits, "a commit has a fixed size below the limit");
@@ -99,7 +99,7 @@ impl Batch {
 
 fn record(kind: u8, sequence: u64, write: impl FnOnce(&mut Vec<u8>), out: &mut Vec<u8>) -> bool {
     let at = out.len();
-    out.extend([0; 8]);
+    out.extend_from_slice(&[0; 8]);
     out.push(kind);
     write(out);
     let size = out.len() - at - 8;

@@ -13,30 +13,40 @@ pub const KNOWN: u8 = 1;
 /// Some of its changes came later than changes of later moments.
 pub const DISORDERED: u8 = 2;
 
-/// Columns by id.
+/// What is kept by id, side by side: whoever asks for one of an object's numbers mostly asks for others too.
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+pub struct Head {
+    /// Since when the object is there.
+    pub born: Nanos,
+    /// The latest moment of which something is known of it.
+    pub latest: Nanos,
+    /// Its row; [`NONE`] while it is not there.
+    pub row: u32,
+    /// Sequence number of the event that first put it.
+    pub first: u32,
+    /// The last of its changes, 1 + index; 0 for none.
+    pub last: u32,
+    /// Rotation: the vector part of its unit quaternion.
+    pub rotation: [f32; 3],
+    /// Which properties have changed since it was put, as far as 16 bits tell.
+    pub touched: u16,
+    /// Source and confidence of the event that first put it.
+    pub origin: [u8; 2],
+    /// [`KNOWN`], [`DISORDERED`].
+    pub flags: u8,
+    /// Zeros, so that no byte is left out.
+    pub padding: [u8; 3],
+}
+
+/// 256 ids.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 pub struct Heads {
-    /// Since when the object is there.
-    pub born: [Nanos; ROWS],
-    /// The latest moment of which something is known of it.
-    pub latest: [Nanos; ROWS],
-    /// Its row; [`NONE`] while it is not there.
-    pub row: [u32; ROWS],
-    /// Sequence number of the event that first put it.
-    pub first: [u32; ROWS],
-    /// The last of its changes, 1 + index; 0 for none.
-    pub last: [u32; ROWS],
-    /// Rotation: the vector part of its unit quaternion.
-    pub rotation: [[f32; 3]; ROWS],
-    /// Which properties have changed since it was put, as far as 16 bits tell.
-    pub touched: [u16; ROWS],
-    /// Source and confidence of the event that first put it.
-    pub origin: [[u8; 2]; ROWS],
-    /// Number of parts.
+    /// One an id.
+    pub of: [Head; ROWS],
+    /// Numbers of parts, which are summed up to find an object's.
     pub parts: [u8; ROWS],
-    /// [`KNOWN`], [`DISORDERED`].
-    pub flags: [u8; ROWS],
 }
 
 /// Columns and parts.
@@ -52,7 +62,7 @@ impl Page {
     /// A page of ids that were never given.
     pub fn empty() -> Page {
         let mut heads: Box<Heads> = Box::new(Zeroable::zeroed());
-        heads.row = [NONE; ROWS];
+        heads.of.iter_mut().for_each(|head| head.row = NONE);
         Page { heads: Stored::Owned(heads), parts: Run::default() }
     }
     fn span(&self, at: usize) -> (usize, usize) {

@@ -17,7 +17,7 @@ use crate::{
 use bytemuck::{Pod, Zeroable};
 use std::{collections::BTreeMap, sync::Arc};
 
-const MAGIC: [u8; 8] = *b"ACM-SNP2";
+const MAGIC: [u8; 8] = *b"ACM-SNP3";
 /// Room for more sections than there are.
 const SECTIONS: usize = 32;
 const ALIGN: usize = 64;
@@ -161,6 +161,11 @@ pub struct Found {
 /// Reads a file's bytes where they lie; every byte is checked first.
 ///
 /// # Errors
+/// Whether a file is a snapshot of another layout than this program's: the log has all that is in it.
+pub fn is_of_another_layout(map: &Map) -> bool {
+    map.bytes().starts_with(&MAGIC[..7]) && !map.bytes().starts_with(&MAGIC)
+}
+
 /// Says in words what is damaged.
 pub fn read(map: Arc<Map>) -> Result<Found, String> {
     let head = *map.slice::<Head>(0, 1).and_then(<[Head]>::first).ok_or("it is too short")?;

@@ -87,13 +87,14 @@ impl State {
             let State { table, pages, .. } = self;
             *table = table.sorted(&mut |id, row| {
                 if let Some(page) = pages.get_mut(id as usize / ROWS) {
-                    page.heads.get_mut().row[id as usize % ROWS] = row;
+                    page.heads.get_mut().of[id as usize % ROWS].row = row;
                 }
             });
         }
         if self.history.is_loose() || all && self.history.sorted < self.history.deltas.len() {
             let State { history, pages, .. } = self;
-            history.sort(pages.all_mut().flat_map(|page| page.heads.get_mut().last.iter_mut()));
+            history
+                .sort(pages.all_mut().flat_map(|page| page.heads.get_mut().of.iter_mut().map(|head| &mut head.last)));
         }
         let most = if all { 0 } else { usize::MAX };
         if all {
@@ -134,12 +135,12 @@ impl State {
     pub fn head(&self, id: Id) -> Option<(&Heads, usize)> {
         let heads = self.pages.get(id as usize / ROWS)?.heads.get();
         let at = id as usize % ROWS;
-        (heads.flags[at] & KNOWN != 0).then_some((heads, at))
+        (heads.of[at].flags & KNOWN != 0).then_some((heads, at))
     }
     /// The row of an object that is there.
     #[inline]
     pub fn row(&self, id: Id) -> Option<u32> {
-        let row = self.pages.get(id as usize / ROWS)?.heads.get().row[id as usize % ROWS];
+        let row = self.pages.get(id as usize / ROWS)?.heads.get().of[id as usize % ROWS].row;
         (row != NONE).then_some(row)
     }
     /// The position of an object that is there.
@@ -185,7 +186,7 @@ impl State {
             category: hot.category[row],
             region: hot.region[row],
             position: block.position(row),
-            rotation: heads.rotation[at],
+            rotation: heads.of[at].rotation,
             confidence: hot.weight[row].exp(),
             affordances,
             states: members(Kind::State),
@@ -195,8 +196,8 @@ impl State {
     /// Ids of all objects that are there, in order.
     pub fn ids(&self) -> impl Iterator<Item = Id> {
         (0..).zip(self.pages.iter()).flat_map(|(page, heads): (u32, &Page)| {
-            let rows = heads.heads.get().row.iter().enumerate();
-            rows.filter(|(_, row)| **row != NONE).map(move |(at, _)| page * ROWS as u32 + at as u32)
+            let rows = heads.heads.get().of.iter().map(|head| head.row).enumerate();
+            rows.filter(|(_, row)| *row != NONE).map(move |(at, _)| page * ROWS as u32 + at as u32)
         })
     }
 
@@ -234,10 +235,10 @@ impl State {
     /// An object as it was at `valid`, from what was known at `known`; `None` if it was not put by then.
     pub fn as_of(&self, id: Id, valid: Nanos, known: Nanos) -> Option<Past> {
         let (heads, at) = self.head(id)?;
-        if heads.born[at] > valid || u64::from(heads.first[at]) >= self.history.until(known) {
+        if heads.of[at].born > valid || u64::from(heads.of[at].first) >= self.history.until(known) {
             return None;
         }
-        let ordered = heads.flags[at] & DISORDERED == 0;
+        let ordered = heads.of[at].flags & DISORDERED == 0;
         let keys = [
             history::POSITION,
             history::ROTATION,
@@ -246,8 +247,8 @@ impl State {
             history::CONFIDENCE,
             history::THERE,
         ];
-        let last = heads.last[at];
-        let touched = heads.touched[at];
+        let last = heads.of[at].last;
+        let touched = heads.of[at].touched;
         let never = |key: Key| touched & 1 << key == 0;
         let found = if last == 0 { [None; 6] } else { self.history.at(last, ordered, keys, never, (valid, known)) };
         let row = self.row(id).and_then(|row| self.table.at(row));
@@ -257,7 +258,7 @@ impl State {
         Some(Past {
             position: position
                 .map_or_else(|| row.map_or([0.0; 3], |(block, row)| block.position(row)), history::position),
-            rotation: rotation.map_or(heads.rotation[at], history::position),
+            rotation: rotation.map_or(heads.of[at].rotation, history::position),
             region: region.map_or_else(|| now(|hot, row| hot.region[row].into()), |value| value[0]) as Symbol,
             category: category.map_or_else(|| now(|hot, row| hot.category[row].into()), |value| value[0]) as Symbol,
             confidence: confidence.map_or_else(
@@ -270,14 +271,14 @@ impl State {
     /// A state of an object as it was at `valid`, from what was known at `known`.
     pub fn sure_as_of(&self, id: Id, state: Symbol, valid: Nanos, known: Nanos) -> Sure {
         let Some((heads, at)) = self.head(id) else { return Sure::Unknown };
-        if heads.born[at] > valid || u64::from(heads.first[at]) >= self.history.until(known) {
+        if heads.of[at].born > valid || u64::from(heads.of[at].first) >= self.history.until(known) {
             return Sure::Unknown;
         }
-        let ordered = heads.flags[at] & DISORDERED == 0;
-        match self.history.at(heads.last[at], ordered, [FIRST + state], |_| false, (valid, known)) {
+        let ordered = heads.of[at].flags & DISORDERED == 0;
+        match self.history.at(heads.of[at].last, ordered, [FIRST + state], |_| false, (valid, known)) {
             [Some(value)] => history::sure(value),
             // It never changed, or only later: then its first value was written down.
-            [None] if self.changed(heads.last[at], FIRST + state) => Sure::Unknown,
+            [None] if self.changed(heads.of[at].last, FIRST + state) => Sure::Unknown,
             [None] => self.sure(id, state),
         }
     }
@@ -341,29 +342,29 @@ impl State {
         let Some(page) = self.pages.get_mut(id as usize / ROWS) else { return false };
         let (heads, at) = (page.heads.get_mut(), id as usize % ROWS);
         let bit = bit(key);
-        let mut last = heads.last[at];
+        let mut last = heads.of[at].last;
         let history = &mut self.history;
         let known_before =
-            heads.touched[at] & bit != 0 && (key < FIRST || history.chain(last).any(|(_, delta)| delta.key == key));
+            heads.of[at].touched & bit != 0 && (key < FIRST || history.chain(last).any(|(_, delta)| delta.key == key));
         if !known_before && let Some(old) = old {
-            let (born, first) = (heads.born[at], heads.first[at]);
+            let (born, first) = (heads.of[at].born, heads.of[at].first);
             let known = history.known_or(u64::from(first), context.known);
-            last = history.add((born, known), first, key, heads.origin[at], old, last);
+            last = history.add((born, known), first, key, heads.of[at].origin, old, last);
             // It goes behind changes of other properties that are of later moments.
-            heads.flags[at] |= if heads.latest[at] > born { DISORDERED } else { 0 };
+            heads.of[at].flags |= if heads.of[at].latest > born { DISORDERED } else { 0 };
         }
-        heads.touched[at] |= bit;
-        let late = context.valid < heads.latest[at];
+        heads.of[at].touched |= bit;
+        let late = context.valid < heads.of[at].latest;
         let newest = !late || {
-            heads.flags[at] |= DISORDERED;
+            heads.of[at].flags |= DISORDERED;
             let newer = |(index, delta): (u32, &history::Delta)| {
                 delta.key == key && history.valid_or(index, delta, context.known) > context.valid
             };
             !history.chain(last).any(newer)
         };
         last = history.add((context.valid, context.known), context.sequence, key, context.origin, new, last);
-        heads.last[at] = last;
-        heads.latest[at] = heads.latest[at].max(context.valid);
+        heads.of[at].last = last;
+        heads.of[at].latest = heads.of[at].latest.max(context.valid);
         newest
     }
 
@@ -378,7 +379,7 @@ impl State {
         }
         let Some(page) = self.pages.get_mut(id as usize / ROWS) else { return };
         let at = id as usize % ROWS;
-        let came_back = page.heads.get().flags[at] & KNOWN != 0;
+        let came_back = page.heads.get().of[at].flags & KNOWN != 0;
         page.set_parts(at, &object.parts);
         let row = Row {
             id,
@@ -389,12 +390,12 @@ impl State {
         };
         let row = self.table.add(row);
         let heads = page.heads.get_mut();
-        heads.row[at] = row;
-        heads.rotation[at] = object.rotation;
+        heads.of[at].row = row;
+        heads.of[at].rotation = object.rotation;
         if !came_back {
-            heads.flags[at] = KNOWN;
-            (heads.born[at], heads.latest[at]) = (context.valid, context.valid);
-            (heads.first[at], heads.origin[at]) = (context.sequence, context.origin);
+            heads.of[at].flags = KNOWN;
+            (heads.of[at].born, heads.of[at].latest) = (context.valid, context.valid);
+            (heads.of[at].first, heads.of[at].origin) = (context.sequence, context.origin);
         }
         self.members(object, row);
         (self.is_still, _) = (false, self.moved.push(id));
@@ -471,8 +472,8 @@ impl State {
 
     fn shift(&mut self, id: Id, position: [f32; 3], rotation: [f32; 3], context: Context) {
         let Some((row, (heads, at))) = self.row(id).zip(self.head(id)) else { return };
-        let old_rotation = heads.rotation[at];
-        let heads_touched = heads.touched[at] & 1 << history::ROTATION != 0;
+        let old_rotation = heads.of[at].rotation;
+        let heads_touched = heads.of[at].touched & 1 << history::ROTATION != 0;
         let Some(old) = self.table.at(row).map(|(block, at)| block.position(at)) else { return };
         let (new, before) = (history::of_position(position), history::of_position(old));
         if self.change(id, history::POSITION, new, Some(before), context) && old != position {
@@ -486,7 +487,7 @@ impl State {
             && self.change(id, history::ROTATION, new, Some(old), context)
             && let Some(page) = self.pages.get_mut(id as usize / ROWS)
         {
-            page.heads.get_mut().rotation[id as usize % ROWS] = rotation;
+            page.heads.get_mut().of[id as usize % ROWS].rotation = rotation;
         }
     }
 
@@ -516,7 +517,7 @@ impl State {
         let new = self.table.add(row);
         sets.into_iter().for_each(|set| self.table.put(new, set, true));
         if let Some(page) = self.pages.get_mut(id as usize / ROWS) {
-            page.heads.get_mut().row[id as usize % ROWS] = new;
+            page.heads.get_mut().of[id as usize % ROWS].row = new;
         }
     }
 
@@ -558,7 +559,7 @@ impl State {
             return;
         }
         let Some(page) = self.pages.get(id as usize / ROWS) else { return };
-        let rotation = page.heads.get().rotation[id as usize % ROWS];
+        let rotation = page.heads.get().of[id as usize % ROWS].rotation;
         // What the columns alone knew is lost with the row.
         for (key, value) in values.into_iter().chain([(history::ROTATION, history::of_position(rotation))]) {
             self.keep_first(id, key, value);
@@ -573,25 +574,26 @@ impl State {
         }
         if let Some(page) = self.pages.get_mut(id as usize / ROWS) {
             page.set_parts(id as usize % ROWS, &[]);
-            page.heads.get_mut().row[id as usize % ROWS] = NONE;
+            page.heads.get_mut().of[id as usize % ROWS].row = NONE;
         }
     }
 
     /// Writes down the value that a property has had from the beginning, if it never changed.
     fn keep_first(&mut self, id: Id, key: Key, value: [u32; 3]) {
         let Some((heads, at)) = self.head(id) else { return };
-        if self.changed(heads.last[at], key) {
+        if self.changed(heads.of[at].last, key) {
             return;
         }
-        let (born, first, origin, last) = (heads.born[at], heads.first[at], heads.origin[at], heads.last[at]);
+        let (born, first, origin, last) =
+            (heads.of[at].born, heads.of[at].first, heads.of[at].origin, heads.of[at].last);
         let known = self.history.known_or(first.into(), self.now.max(born));
         let last = self.history.add((born, known), first, key, origin, value, last);
         if let Some(page) = self.pages.get_mut(id as usize / ROWS) {
             let heads = page.heads.get_mut();
-            heads.last[id as usize % ROWS] = last;
-            heads.touched[id as usize % ROWS] |= bit(key);
+            heads.of[id as usize % ROWS].last = last;
+            heads.of[id as usize % ROWS].touched |= bit(key);
             // Its moment lies before those that are in the chain already.
-            heads.flags[id as usize % ROWS] |= DISORDERED;
+            heads.of[id as usize % ROWS].flags |= DISORDERED;
         }
     }
 }

@@ -161,14 +161,16 @@ impl Store {
         };
         sweep(&mut *disk, manifest).map_err(io_error("what is left over cannot be removed"))?;
         let (mut state, mut document, mut batch) = (State::default(), None, 0);
+        let mut first = manifest.first;
         if let Some(number) = manifest.snapshot {
             let file = snapshot::name(number);
             let map = disk.map(&file).map_err(io_error("the snapshot cannot be read"))?;
-            let found = snapshot::read(Arc::new(map)).map_err(|reason| StoreError::Damaged { file, reason })?;
-            (state, document, batch) = (found.state, Some(found.document), found.batch);
+            if !snapshot::is_of_another_layout(&map) {
+                let found = snapshot::read(Arc::new(map)).map_err(|reason| StoreError::Damaged { file, reason })?;
+                (state, document, batch, first) = (found.state, Some(found.document), found.batch, number);
+            }
         }
         let skip = Place { batch, next: state.next };
-        let first = manifest.snapshot.unwrap_or(manifest.first);
         let log = Log::open(&mut *disk, (manifest.first, first), skip, |first, time, bodies| {
             let mut events = Vec::with_capacity(bodies.len());
             for (number, body) in (first..).zip(bodies) {
@@ -329,19 +331,27 @@ impl Store {
     fn put_log(&mut self, batches: &[(Nanos, Vec<Event>)]) -> io::Result<()> {
         let first = self.log.segment() + 1;
         let mut log = Log::begin(&mut *self.disk, first, Place { batch: 0, next: 0 })?;
-        let mut bytes = Batch::default();
+        // Many batches are written as one group: each alone would begin on a block of its own.
+        let (mut bytes, mut open) = (Batch::default(), None);
+        let mut next = 0;
         for (time, events) in batches {
-            let place = log.place();
-            let mut next = place.next;
+            if let Some(before) = open {
+                bytes.mark(next, before);
+            }
             for event in events {
                 if !bytes.event(next, |out| event::write(event, out)) {
                     return Err(io::Error::other("an event is larger than a record may be"));
                 }
                 next += 1;
             }
-            bytes.commit(place.batch, next, *time);
-            log.write(&mut *self.disk, bytes.bytes(), Place { batch: place.batch + 1, next })?;
-            bytes.clear();
+            open = Some(*time);
+            if bytes.bytes().len() >= GROUP_BYTES {
+                put_group(&mut log, &mut *self.disk, &mut bytes, next, *time)?;
+                open = None;
+            }
+        }
+        if let Some(time) = open {
+            put_group(&mut log, &mut *self.disk, &mut bytes, next, time)?;
         }
         log.sync(&mut *self.disk)?;
         self.manifest = Manifest { first, snapshot: None };
@@ -358,6 +368,14 @@ impl Store {
         }
         Ok(sum)
     }
+}
+
+fn put_group(log: &mut Log, disk: &mut dyn Disk, bytes: &mut Batch, next: u64, time: Nanos) -> io::Result<()> {
+    let batch = log.place().batch;
+    bytes.commit(batch, next, time);
+    log.write(disk, bytes.bytes(), Place { batch: batch + 1, next })?;
+    bytes.clear();
+    Ok(())
 }
 
 /// Removes what a crash or a rewrite left behind: it is in no manifest.

@@ -61,6 +61,26 @@ fn a_flipped_bit_is_never_read_as_something_else() {
 }
 
 #[test]
+fn a_snapshot_of_another_layout_is_passed_over() {
+    let disk = FaultDisk::default();
+    let (mut store, _) = Store::open_on(Box::new(disk.clone()), |_, _, _| Ok(())).unwrap();
+    let (mut world, words) = World::new(2, 4, 6);
+    store.commit(&[words], 0).unwrap();
+    store.commit(&[world.put(1, 1)], 1).unwrap();
+    store.snapshot(b"document").unwrap();
+    store.commit(&[world.put(2, 2)], 2).unwrap();
+    let wanted = digest(store.state());
+    drop(store);
+    disk.overwrite("00000001.snapshot", |bytes| bytes[7] = b'2');
+    let (mut store, document) = Store::open_on(Box::new(disk.clone()), |_, _, _| Ok(())).unwrap();
+    assert_eq!((digest(store.state()), document), (wanted, None));
+    store.snapshot(b"again").unwrap();
+    drop(store);
+    let (store, document) = Store::open_on(Box::new(disk), |_, _, _| Ok(())).unwrap();
+    assert_eq!((digest(store.state()), document.as_deref()), (wanted, Some(b"again".as_slice())));
+}
+
+#[test]
 fn records_in_another_order_are_damage() {
     let disk = FaultDisk::default();
     let (mut store, _) = Store::open_on(Box::new(disk.clone()), |_, _, _| Ok(())).unwrap();

@@ -25,7 +25,7 @@ pub fn digest(state: &State) -> u32 {
     let mut add = |text: String| check = crc32c::crc32c_append(check, text.as_bytes());
     for id in state.ids() {
         add(format!("{:?}", state.object(id)));
-        let last = state.head(id).map_or(0, |(heads, at)| heads.last[at]);
+        let last = state.head(id).map_or(0, |(heads, at)| heads.of[at].last);
         add(format!("{:?}", state.history.changes(last)));
     }
     state.relations.forth.iter().for_each(|edge| add(format!("{edge:?}")));
@@ -75,8 +75,12 @@ fn one(draw: &mut Draw) -> Result<(), Fault> {
             0 => store.snapshot(b"document"),
             1 if next > 0 => {
                 let what = Forget { objects: vec![draw.below(next as usize) as Id], ..Forget::default() };
-                // Forgetting goes from the one to the other in one step.
-                forgotten(&mut store, &what, &mut sure, &mut maybe)
+                rewritten(&mut store, &|store| store.forget(&what, |_, _| None).map(drop), &mut sure, &mut maybe)
+            }
+            2 => {
+                let horizon = draw.below(step as usize) as u64 * 1000;
+                let compact = |store: &mut Store| store.compact(horizon, |_| Ok(Vec::new())).map(drop);
+                rewritten(&mut store, &compact, &mut sure, &mut maybe)
             }
             grouped => {
                 let events = batch(&mut world, draw, &mut next, time);
@@ -114,7 +118,13 @@ fn one(draw: &mut Draw) -> Result<(), Fault> {
     }
 }
 
-fn forgotten(store: &mut Store, what: &Forget, sure: &mut u32, maybe: &mut u32) -> Result<(), crate::StoreError> {
+/// Forgetting and compaction go from what was there to what shall be there in one step.
+fn rewritten(
+    store: &mut Store,
+    rewrite: &dyn Fn(&mut Store) -> Result<(), crate::StoreError>,
+    sure: &mut u32,
+    maybe: &mut u32,
+) -> Result<(), crate::StoreError> {
     store.flush()?;
     *sure = digest(store.state());
     // What it would come to, on a disk that does not fail.
@@ -128,9 +138,9 @@ fn forgotten(store: &mut Store, what: &Forget, sure: &mut u32, maybe: &mut u32) 
     }
     let mut twin = Store::in_memory();
     twin.rewrite(&batches)?;
-    twin.forget(what, |_, _| None)?;
+    rewrite(&mut twin)?;
     *maybe = digest(twin.state());
-    store.forget(what, |_, _| None).map(drop)
+    rewrite(store)
 }
 
 fn batch(world: &mut World, draw: &mut Draw, next: &mut Id, time: u64) -> Vec<Event> {
