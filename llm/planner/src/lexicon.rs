@@ -64,6 +64,10 @@ pub(crate) enum Slot {
     Side,
     /// A noun that says nothing more.
     Kind,
+    /// A word for what shows something.
+    Sign,
+    /// Several things, parted by commas, "and" or "then".
+    List,
     /// "not", for a condition that must not hold.
     Not,
     /// The thing whose past is meant.
@@ -125,6 +129,10 @@ pub(crate) struct Frame {
     pub tool_state: Option<String>,
     /// What the object goes into, for verbs that say it themselves: "discard".
     pub into: Option<String>,
+    /// What the object goes into is whatever contains: "insert".
+    pub into_any: bool,
+    /// Only together with what says when it is right.
+    pub needs_sign: bool,
     pub forms: Vec<FrameForm>,
 }
 
@@ -134,6 +142,8 @@ pub(crate) struct Frame {
 pub(crate) enum ModifierKind {
     /// As often as a thing shows.
     Shown,
+    /// The same in front of the clause: "the card says how often to press the key".
+    ShownFirst,
     /// Until a condition holds.
     Until,
     /// Only if a condition holds.
@@ -156,6 +166,8 @@ pub(crate) enum ModifierKind {
     TakesPlace,
     /// And its heading.
     TakesHeading,
+    /// What is tried may lie the other way round.
+    MayTurn,
 }
 
 /// A form of a modifier.
@@ -172,6 +184,8 @@ pub(crate) struct StateWords {
     pub holds: bool,
     /// The subject of a statement is no argument.
     pub said_of_moment: bool,
+    /// It is said of what was spoken of last.
+    pub said_of_last: bool,
     pub adjectives: Vec<Form>,
     pub forms: Vec<Form>,
 }
@@ -225,6 +239,10 @@ pub(crate) struct Words {
     pub several_slices: Vec<Form>,
     pub measures: Vec<Form>,
     pub twins: Vec<Form>,
+    pub twin_alone: Vec<Form>,
+    pub own_links: Vec<Form>,
+    pub signs: Vec<Form>,
+    pub what: Vec<Form>,
     pub twin_links: Vec<Form>,
     pub containing: Vec<Form>,
     pub within_it: Vec<Form>,

@@ -192,12 +192,21 @@ impl<'a> Grounder<'a> {
             return Ok(self.inside_part(contenders, part, began));
         }
         if let Destination::On { reference } | Destination::In { reference } = destination {
-            let under = self.object_at(*reference, depth + 1)?.value;
-            let outline = self.view.object(under).and_then(|entry| Extent::now(self.view, entry));
+            let under: Vec<(ObjectId, Option<Extent>)> = match self.reference(*reference)?.quantity {
+                Quantity::Group | Quantity::Count(_) => {
+                    self.group(*reference, depth + 1)?.iter().map(|e| (e.id, Extent::now(self.view, e))).collect()
+                }
+                Quantity::TheOne | Quantity::AnyOne => {
+                    let id = self.object_at(*reference, depth + 1)?.value;
+                    vec![(id, self.view.object(id).and_then(|entry| Extent::now(self.view, entry)))]
+                }
+            };
             let stands = |entry: &&&ObjectEntry| {
                 place_at(entry, began).is_some_and(|(pose, support)| {
-                    let inside = || outline.as_ref().is_some_and(|o| o.covers(pose.translation.truncate()));
-                    entry.id != under && (support == Some(under) || inside())
+                    under.iter().any(|(id, outline)| {
+                        let inside = || outline.as_ref().is_some_and(|o| o.covers(pose.translation.truncate()));
+                        entry.id != *id && (support == Some(*id) || inside())
+                    })
                 })
             };
             return Ok(contenders.iter().filter(stands).copied().collect());

@@ -1,10 +1,12 @@
 //! What is or is not so, and what follows a clause and says how it is meant.
 
+
 use super::{
     phrase::keep_longest_first,
     reader::{Captures, Reader},
-    syntax::{Modifier, PlaceKind, Relation, Statement},
+    syntax::{Modifier, NounPhrase, PlaceKind, Pronoun, Relation, Statement},
 };
+use crate::lexicon::ModifierKind;
 
 impl Reader<'_> {
     /// All readings of a statement that may hold or not, the longest first.
@@ -21,11 +23,16 @@ impl Reader<'_> {
                         // Other places have no predicate that memory judges.
                         Some(_) => continue,
                     };
+                    let last = || NounPhrase { pronoun: Some(Pronoun::One), ..self.blank(at, end) };
+                    let about = match state.said_of_last {
+                        true => Some(last()),
+                        false => captures.it.filter(|_| !state.said_of_moment),
+                    };
                     let statement = Statement {
                         span: self.span(at, end),
                         predicate,
                         negated: state.holds == captures.negated,
-                        about: captures.it.filter(|_| !state.said_of_moment),
+                        about,
                         place: captures.place,
                     };
                     readings.push((statement, end));
@@ -54,6 +61,7 @@ impl Reader<'_> {
                     thing,
                     condition: captures.condition,
                     side: captures.side,
+                    list: captures.list,
                     form: index,
                 };
                 best = Some((read, end));
@@ -73,7 +81,8 @@ impl Reader<'_> {
         loop {
             let start = if self.is_comma(at) { at + 1 } else { at };
             let start = if self.is_word(start, "and") { start + 1 } else { start };
-            match self.clause_modifier(start).or_else(|| self.clause_modifier(at)) {
+            let trailing = |at| self.clause_modifier(at).filter(|(read, _)| read.kind != ModifierKind::ShownFirst);
+            match trailing(start).or_else(|| trailing(at)) {
                 Some((modifier, end)) if modifiers.len() < MAX_MODIFIERS => {
                     modifiers.push(modifier);
                     at = end;

@@ -21,7 +21,7 @@ mod token;
 
 pub use error::ParseError;
 pub(crate) use interpret::{nouns_of, settle_subtasks};
-pub(crate) use role::{CONTAINS, Role, SUPPORTIVE};
+pub(crate) use role::{CONTAINS, COVERING, Role, SUPPORTIVE};
 pub use sentence::MAX_CLAUSES;
 pub use token::{MAX_BYTES, MAX_TOKENS};
 

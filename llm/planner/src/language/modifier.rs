@@ -4,7 +4,7 @@ use super::{
     phrase::Phrases,
     reader::Reader,
     role::{CONTAINS, Role},
-    syntax::{NounPhrase, PlaceKind, PlacePhrase, Relation},
+    syntax::{NounPhrase, PlaceKind, PlacePhrase, Pronoun, Relation},
 };
 use crate::task::{Direction, Quantity, Rank};
 use acm_memory::query::PlaceReference;
@@ -28,7 +28,7 @@ impl Reader<'_> {
                 let article = article.unwrap_or(end);
                 // A table that the library knows is a thing like others.
                 if let Some(whole) = self.longest(article, &words.whole).filter(|_| self.noun(article).is_none()) {
-                    readings.push((phrase.clone(), whole));
+                    readings.push((NounPhrase { somewhere: true, ..phrase.clone() }, whole));
                 }
             }
             readings.extend(self.side(phrase, start));
@@ -40,6 +40,8 @@ impl Reader<'_> {
         readings.extend(self.twin_of(phrase, at, depth));
         readings.extend(self.containing(phrase, at, depth));
         readings.extend(self.handled(phrase, at));
+        let own = self.class(at, &words.own_links).into_iter();
+        readings.extend(own.map(|end| (NounPhrase { its: true, ..phrase.clone() }, end)));
         for (phrase, end) in &mut readings {
             phrase.span = phrase.span.join(self.span(at, *end));
         }
@@ -98,8 +100,20 @@ impl Reader<'_> {
             return Vec::new();
         }
         let wholes = self.noun_phrases(at + 1, depth + 1).into_iter();
-        let single = wholes.filter(|(whole, _)| !whole.several() && whole.pronoun.is_none());
-        single.map(|(whole, end)| (NounPhrase { part_of: Some(Box::new(whole)), ..phrase.clone() }, end)).collect()
+        let named = wholes.filter(|(whole, _)| whole.pronoun.is_none());
+        let described = named.map(|(whole, end)| {
+            let several = whole.several();
+            let phrase = match several {
+                // "the blocks of the trays" are on them.
+                true => {
+                    let place = PlacePhrase { span: whole.span, kind: PlaceKind::At(whole, Relation::On) };
+                    NounPhrase { located: Some(Box::new(place)), ..phrase.clone() }
+                }
+                false => NounPhrase { part_of: Some(Box::new(whole)), ..phrase.clone() },
+            };
+            (phrase, end)
+        });
+        described.collect()
     }
 
     /// "the twin of the cube" is a phrase of its own; here "a cube like that one", "the same cube as before it".
@@ -108,6 +122,10 @@ impl Reader<'_> {
             return Vec::new();
         }
         let mut readings = Vec::new();
+        for end in self.class(at, &self.lexicon.words.twin_alone) {
+            let it = NounPhrase { pronoun: Some(Pronoun::One), ..self.blank(end, end) };
+            readings.push((NounPhrase { twin_of: Some(Box::new(it)), ..phrase.clone() }, end));
+        }
         for end in self.class(at, &self.lexicon.words.twin_links) {
             for (model, end) in self.noun_phrases(end, depth + 1) {
                 readings.push((NounPhrase { twin_of: Some(Box::new(model)), ..phrase.clone() }, end));
@@ -124,6 +142,8 @@ impl Reader<'_> {
         let words = &self.lexicon.words;
         let mut readings = Vec::new();
         for start in self.class(at, &words.containing) {
+            // "a holder with a gauge": what shows something is part of it.
+            readings.extend(self.signs(start).into_iter().map(|end| (phrase.clone(), end)));
             for (content, end) in self.noun_phrases(start, depth + 1) {
                 let contains = Role::Affordance(CONTAINS).fits(self.library, phrase.noun.as_deref());
                 let inside = self.longest(end, &words.prepositions_in).is_some();

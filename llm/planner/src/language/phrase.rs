@@ -45,6 +45,11 @@ impl Reader<'_> {
                 readings.push((NounPhrase { pronoun: Some(pronoun), ..self.blank(at, end) }, end));
             }
         }
+        // "what stands on the bench" is named by its place alone.
+        for end in self.class(at, &self.lexicon.words.what) {
+            let named = self.modified(self.blank(at, end), end, depth).into_iter();
+            readings.extend(named.filter(|(phrase, _)| phrase.located.is_some()));
+        }
         keep_longest_first(&mut readings);
         self.know_phrases(at, depth, &readings);
         readings
@@ -64,6 +69,8 @@ impl Reader<'_> {
             rank: None,
             free: false,
             other: false,
+            same: false,
+            somewhere: false,
             states: Vec::new(),
             located: None,
             part_of: None,
@@ -127,6 +134,10 @@ impl Reader<'_> {
         let mut adjectives = 0;
         let mut heads = Vec::new();
         let mut elided: Phrases = Vec::new();
+        // "each behind its cube": a side may also begin a place.
+        if determiner.each && self.meaning(start, &self.lexicon.directions).is_some() {
+            elided.push((NounPhrase { elided: true, ..phrase.clone() }, start));
+        }
         // Adjectives parted by a comma or "and" need their noun.
         let mut parted = false;
         loop {
@@ -196,6 +207,7 @@ impl Reader<'_> {
         let described = phrase.color.is_some() || phrase.size.is_some() || !phrase.states.is_empty();
         let at = if (self.is_stop(at) || self.is_word(at, "and")) && described { at + 1 } else { at };
         if let Some(end) = self.longest(at, &words.same) {
+            phrase.same = true;
             return Some(end);
         }
         if let Some(end) = self.longest(at, &words.other) {

@@ -57,6 +57,7 @@ pub(super) struct Captures {
     pub negated: bool,
     pub times: Option<u32>,
     pub it: Option<NounPhrase>,
+    pub list: Vec<NounPhrase>,
 }
 
 /// Reads phrases from the tokens of one instruction.
@@ -221,6 +222,11 @@ impl<'a> Reader<'a> {
                 sides.map(|(side, end)| with(&|c| c.side = c.side.or(Some(side)), end)).collect()
             }
             Slot::Kind => self.kinds(at).into_iter().map(|end| (captures.clone(), end)).collect(),
+            Slot::Sign => self.signs(at).into_iter().map(|end| (captures.clone(), end)).collect(),
+            Slot::List => {
+                let lists = self.enumerations(at, depth).into_iter();
+                lists.map(|(list, end)| with(&|c| c.list = list.clone(), end)).collect()
+            }
             Slot::Not => match self.longest(at, &self.lexicon.words.not) {
                 Some(end) => vec![with(&|c| c.negated = true, end)],
                 None => Vec::new(),
@@ -304,6 +310,50 @@ impl<'a> Reader<'a> {
         let mut ends = self.class(at, &self.lexicon.words.things);
         ends.extend(self.noun(at).map(|noun| noun.end));
         ends
+    }
+    /// "the green light", "the needle of the gauge": which thing has it nobody says.
+    pub(super) fn signs(&self, at: usize) -> Vec<usize> {
+        let words = &self.lexicon.words;
+        let article = self.longest(at, &words.definite).or_else(|| self.longest(at, &words.indefinite));
+        let Some(end) = self.longest(self.skip_adjectives(article.unwrap_or(at)), &words.signs) else {
+            return Vec::new();
+        };
+        let mut ends = vec![end];
+        if self.is_word(end, "of") {
+            let article = self.longest(end + 1, &words.definite).unwrap_or(end + 1);
+            ends.extend(self.kinds(article));
+            ends.extend(self.longest(article, &words.signs));
+        }
+        ends.sort_unstable_by(|a, b| b.cmp(a));
+        ends
+    }
+    /// "red, green, blue", "the red one, then the blue one".
+    fn enumerations(&self, at: usize, depth: u32) -> Vec<(Vec<NounPhrase>, usize)> {
+        let mut open: Vec<(Vec<NounPhrase>, usize)> =
+            self.noun_phrases(at, depth).into_iter().map(|(phrase, end)| (vec![phrase], end)).collect();
+        let mut lists = Vec::new();
+        for _ in 0..MAX_LISTED {
+            let mut longer = Vec::new();
+            for (list, end) in &open {
+                let mut next = *end;
+                while self.is_comma(next) || self.is_word(next, "and") || self.is_word(next, "then") {
+                    next += 1;
+                }
+                if next == *end {
+                    continue;
+                }
+                let more = self.noun_phrases(next, depth).into_iter();
+                longer.extend(more.map(|(phrase, end)| ([list.as_slice(), &[phrase]].concat(), end)));
+            }
+            longer.truncate(MAX_READINGS);
+            lists.append(&mut open);
+            open = longer;
+        }
+        lists.append(&mut open);
+        lists.retain(|(list, _)| list.len() > 1);
+        lists.sort_by_key(|(_, end)| std::cmp::Reverse(*end));
+        lists.truncate(MAX_READINGS);
+        lists
     }
     /// "its", "the" or "the cube's".
     fn owners(&self, at: usize, depth: u32) -> Vec<(Option<NounPhrase>, usize)> {

@@ -7,6 +7,8 @@ use acm_concept::template::TemplateLibrary;
 pub(crate) const SUPPORTIVE: &str = "supportive";
 /// Affordance of what things can be put into.
 pub(crate) const CONTAINS: &str = "contains";
+/// Affordance of what can stand over other things and hide them.
+pub(crate) const COVERING: &str = "covering";
 
 /// What a thing must be able to do to fill a gap in a goal.
 #[derive(Debug, Clone, PartialEq)]

@@ -2,7 +2,7 @@
 
 use super::{
     reader::{Expected, Reader},
-    syntax::{Guard, NounPhrase, Order, Sentence, Statement},
+    syntax::{Guard, Modifier, NounPhrase, Order, Sentence, Statement},
 };
 use crate::lexicon::ModifierKind;
 
@@ -20,18 +20,21 @@ struct Course {
     main_comes_before: bool,
     guard: Option<Guard>,
     guards: usize,
+    /// Whether a sentence begins.
+    fresh: bool,
 }
 
 impl Reader<'_> {
     /// Reads the whole text; `None` if some of it has no reading (the farthest failure says which).
     pub fn sentences(&self) -> Option<Vec<Sentence>> {
-        let mut course = Course::default();
+        let mut course = Course { fresh: true, ..Course::default() };
         let mut at = self.skip_links(0);
         while at < self.tokens.len() && course.sentences.len() <= MAX_CLAUSES {
             let end = self.sentence(&mut course, at)?;
             at = self.skip_links(end);
             let full_stop = (end..at).any(|place| self.tokens.get(place).is_some_and(|token| token.text == "."));
             course.main_comes_before &= !full_stop;
+            course.fresh = full_stop || (end..at).any(|place| self.tokens.get(place).is_some_and(|t| t.text == ":"));
             // An "if" reaches to the end of its sentence, its "otherwise" to the end of the next.
             if full_stop && course.guard.is_some() && self.longest(at, &self.lexicon.words.otherwise).is_none() {
                 course.guard = None;
@@ -48,6 +51,15 @@ impl Reader<'_> {
             return Some(end);
         }
         if let Some(end) = self.guarded(course, at) {
+            return Some(end);
+        }
+        if let Some((modifiers, start)) = self.leading(at, course.fresh) {
+            let (mut clause, end) = self.clause(start, course.last_frame, false)?;
+            clause.modifiers.splice(0..0, modifiers);
+            course.last_frame = Some(clause.frame);
+            let order = if course.main_comes_before { Order::BeforeLast } else { Order::Last };
+            let guard = course.guard.clone().map(Box::new);
+            course.sentences.push(Sentence::Do { clause: Box::new(clause), order, background: false, guard });
             return Some(end);
         }
         if let Some((modifier, end)) =
@@ -92,6 +104,31 @@ impl Reader<'_> {
         let (trailing, end) = self.trailing(end);
         course.sentences.extend(trailing);
         Some(end)
+    }
+
+    /// "From left to right, one at a time, put ...": modifiers in front of the clause that they belong to. What begins a
+    /// sentence belongs to what follows it; within one only what asks for a clause does.
+    fn leading(&self, at: usize, fresh: bool) -> Option<(Vec<Modifier>, usize)> {
+        let mut modifiers = Vec::new();
+        let mut start = at;
+        while let Some((mut modifier, end)) = self.clause_modifier(start) {
+            let belongs = match modifier.kind {
+                ModifierKind::From | ModifierKind::OneAtATime | ModifierKind::OneToAPlace | ModifierKind::EachTry => fresh,
+                ModifierKind::Aside | ModifierKind::ThatOrder | ModifierKind::Shown => fresh,
+                ModifierKind::ShownFirst => true,
+                _ => false,
+            };
+            if !belongs {
+                break;
+            }
+            if modifier.kind == ModifierKind::ShownFirst {
+                modifier.kind = ModifierKind::Shown;
+            }
+            modifiers.push(modifier);
+            start = if self.is_comma(end) { end + 1 } else { end };
+        }
+        let start = self.longest(start, &self.lexicon.words.lead_ins).unwrap_or(start);
+        (!modifiers.is_empty() && self.clause(start, None, false).is_some()).then_some((modifiers, start))
     }
 
     /// Whether the word before belongs to a clause and is no link.

@@ -24,6 +24,10 @@ pub(super) struct NounPhrase {
     pub rank: Option<Rank>,
     pub free: bool,
     pub other: bool,
+    /// "the same".
+    pub same: bool,
+    /// "from the table": somewhere that nobody knows the borders of.
+    pub somewhere: bool,
     pub states: Vec<(String, bool)>,
     pub located: Option<Box<PlacePhrase>>,
     pub part_of: Option<Box<NounPhrase>>,
@@ -88,6 +92,8 @@ pub(super) struct Modifier {
     pub thing: Option<NounPhrase>,
     pub condition: Option<Statement>,
     pub side: Option<Direction>,
+    /// What it names one after the other.
+    pub list: Vec<NounPhrase>,
     /// Index of its form among the lexicon's.
     pub form: usize,
 }

@@ -46,6 +46,10 @@ struct RawWords {
     several_slices: Vec<String>,
     measures: Vec<String>,
     twins: Vec<String>,
+    twin_alone: Vec<String>,
+    own_links: Vec<String>,
+    signs: Vec<String>,
+    what: Vec<String>,
     twin_links: Vec<String>,
     containing: Vec<String>,
     within_it: Vec<String>,
@@ -98,6 +102,8 @@ struct RawState {
     holds: bool,
     #[serde(default)]
     said_of_moment: bool,
+    #[serde(default)]
+    said_of_last: bool,
     #[serde(default)]
     adjectives: Vec<String>,
     #[serde(default)]
@@ -169,6 +175,10 @@ struct RawFrame {
     vary: Option<Variation>,
     tool_state: Option<String>,
     into: Option<String>,
+    #[serde(default)]
+    into_any: bool,
+    #[serde(default)]
+    needs_sign: bool,
     #[serde(default)]
     said_of_object: bool,
     verbs: Vec<String>,
@@ -282,6 +292,10 @@ fn closed_classes(raw: &RawWords) -> Result<Words, LexiconError> {
         several_slices: phrases(&raw.several_slices)?,
         measures: phrases(&raw.measures)?,
         twins: phrases(&raw.twins)?,
+        twin_alone: phrases(&raw.twin_alone)?,
+        own_links: phrases(&raw.own_links)?,
+        signs: phrases(&raw.signs)?,
+        what: phrases(&raw.what)?,
         twin_links: phrases(&raw.twin_links)?,
         containing: phrases(&raw.containing)?,
         within_it: phrases(&raw.within_it)?,
@@ -329,6 +343,7 @@ fn state(raw: &RawState) -> Result<StateWords, LexiconError> {
         predicate: raw.predicate.clone(),
         holds: raw.holds,
         said_of_moment: raw.said_of_moment,
+        said_of_last: raw.said_of_last,
         adjectives: phrases(&raw.adjectives)?,
         forms,
     })
@@ -374,6 +389,8 @@ fn frame(raw: &RawFrame) -> Result<Frame, LexiconError> {
         said_of_object: raw.said_of_object,
         tool_state: raw.tool_state.clone(),
         into: raw.into.clone(),
+        into_any: raw.into_any,
+        needs_sign: raw.needs_sign,
         forms,
     })
 }
@@ -482,6 +499,8 @@ fn slot(name: &str) -> Option<Slot> {
         "condition" => Slot::Condition,
         "side" => Slot::Side,
         "kind" => Slot::Kind,
+        "sign" => Slot::Sign,
+        "list" => Slot::List,
         _ => return None,
     })
 }
@@ -528,6 +547,10 @@ fn known_words(lexicon: &Lexicon) -> BTreeSet<String> {
         &w.several_slices,
         &w.measures,
         &w.twins,
+        &w.twin_alone,
+        &w.own_links,
+        &w.signs,
+        &w.what,
         &w.twin_links,
         &w.containing,
         &w.within_it,

@@ -50,7 +50,7 @@ impl Interpretation<'_> {
         }
         let subtask = self.subtask(statement.span, Goal::Await { condition });
         let at = if trails { self.drafts.len().saturating_sub(1) } else { self.drafts.len() };
-        self.drafts.insert(at, Draft { subtask, guard: None });
+        self.drafts.insert(at, Draft { subtask, guard: None, needs_sign: false, each: false });
         Ok(())
     }
 
@@ -103,6 +103,7 @@ impl Interpretation<'_> {
     pub(super) fn trial(&mut self, clause: &Clause, vary: crate::task::Variation) -> Result<Goal, ParseError> {
         let moved = Role::Effect("at".into());
         let members = match &clause.object {
+            Some(phrase) if phrase.pronoun.is_some() || phrase.elided => self.reference(phrase, &moved)?,
             Some(phrase) => self.reference(phrase, &Role::Mentioned)?,
             None => {
                 let fits = |reference: &crate::task::ObjectReference| {

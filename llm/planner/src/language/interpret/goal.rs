@@ -1,11 +1,11 @@
 //! Goals of clauses, for one thing, for several one after the other, and for two that change places.
 
-use super::{Interpretation, several};
+use super::{Draft, Interpretation, several};
 use crate::{
     language::{
-        ParseError,
+        CONTAINS, COVERING, ParseError,
         role::Role,
-        syntax::{Clause, NounPhrase, PlaceKind, PlacePhrase},
+        syntax::{Clause, Modifier, NounPhrase, PlaceKind, PlacePhrase, Pronoun, Relation},
     },
     lexicon::{FrameGoal, ModifierKind},
     task::{Destination, Goal, ObjectReference, Ordering, Quantity, ReferenceIndex, Span, Times},
@@ -25,6 +25,12 @@ impl Interpretation<'_> {
             }
             _ => {}
         }
+        if let Some(goals) = self.each_others_place(clause)? {
+            return Ok(goals);
+        }
+        if let Some(goal) = self.covered_with(clause)? {
+            return Ok(vec![goal]);
+        }
         let objects = self.objects(clause)?;
         let named = clause.modifier(ModifierKind::ThatOrder);
         if let (Some(_), [first, _, ..]) = (named, objects.as_slice())
@@ -33,6 +39,20 @@ impl Interpretation<'_> {
             let mut body = self.body(clause, members)?;
             let order = Ordering::Named(objects);
             return Ok(vec![Goal::Each { members, order, body: std::mem::take(&mut body) }]);
+        }
+        if let (Some(Modifier { list, .. }), [members]) = (named, objects.as_slice())
+            && !list.is_empty()
+            && self.quantity_several(*members)
+        {
+            let members = *members;
+            let noun = self.references.get(members).and_then(|group| group.noun.clone());
+            let mut order = Vec::with_capacity(list.len());
+            for phrase in list {
+                let noun = if phrase.elided { noun.clone() } else { phrase.noun.clone() };
+                order.push(self.reference(&NounPhrase { noun, ..phrase.clone() }, &Self::role_of(clause))?);
+            }
+            let body = self.body(clause, members)?;
+            return Ok(vec![Goal::Each { members, order: Ordering::Named(order), body }]);
         }
         if let Some(modifier) = named.filter(|_| objects.len() < 2) {
             return Err(self.unsupported(modifier.span, "no order of several things was named"));
@@ -74,6 +94,11 @@ impl Interpretation<'_> {
     fn objects(&mut self, clause: &Clause) -> Result<Vec<ReferenceIndex>, ParseError> {
         let role = Self::role_of(clause);
         let Some(first) = &clause.object else {
+            if clause.tool.is_some()
+                && let Some(covered) = self.covered_before()
+            {
+                return Ok(vec![covered]);
+            }
             return match self.antecedent(clause.span, &role) {
                 Err(ParseError::NoAntecedent { .. }) if matches!(role, Role::Function(_)) => {
                     Ok(vec![self.unnamed(clause.span, &role)])
@@ -151,6 +176,8 @@ impl Interpretation<'_> {
             }
             FrameGoal::State(predicate, holds) => {
                 let by = match &clause.tool {
+                    // What is taken off is what stands there.
+                    Some(_) if !holds => None,
                     Some(tool) => Some(self.reference(tool, &Role::Mentioned)?),
                     None => None,
                 };
@@ -179,7 +206,15 @@ impl Interpretation<'_> {
 
     /// Where a verb that says it itself has the object go.
     fn own_destination(&mut self, clause: &Clause) -> Result<Destination, ParseError> {
-        let into = self.lexicon.frames.get(clause.frame).and_then(|frame| frame.into.clone());
+        let frame = self.lexicon.frames.get(clause.frame);
+        if frame.is_some_and(|frame| frame.into_any) {
+            let contains = Role::Affordance(crate::language::CONTAINS);
+            let fits = |known: &ObjectReference| !several(known) && known.affordance.as_deref() == Some(CONTAINS);
+            let named = self.references.iter().rposition(fits);
+            let reference = named.unwrap_or_else(|| self.unnamed(clause.span, &contains));
+            return Ok(Destination::In { reference });
+        }
+        let into = frame.and_then(|frame| frame.into.clone());
         let Some(noun) = into else { return Err(self.unsupported(clause.span, "it does not say where to")) };
         if self.library.with_noun(&noun).next().is_none() {
             return Err(self.unsupported(clause.span, &format!("I know no {noun} to put it in")));
@@ -256,6 +291,7 @@ impl Interpretation<'_> {
     /// the lid that is on the cube then.
     pub(super) fn belongs_together(&mut self, clause: &Clause) -> Result<bool, ParseError> {
         let (Some(object), Some(PlacePhrase { kind, .. })) = (&clause.object, &clause.place) else { return Ok(false) };
+        let object = &self.cover_meant(object);
         let (PlaceKind::Beside(owner, _) | PlaceKind::At(owner, _)) = kind else { return Ok(false) };
         if !(owner.its && object.each) {
             return Ok(false);
@@ -263,7 +299,10 @@ impl Interpretation<'_> {
         let Some(Goal::Each { members, .. }) = self.drafts.last().map(|draft| draft.subtask.goal.clone()) else {
             return Err(self.unsupported(owner.span, "I do not know which belongs to which"));
         };
-        let same = self.references.get(members).is_some_and(|group| group.noun == owner.noun);
+        let same = self.references.get(members).is_some_and(|group| match (&group.noun, &owner.noun) {
+            (Some(a), Some(b)) => self.same_kind(a, b),
+            _ => group.noun == owner.noun,
+        });
         if !same {
             return Err(self.unsupported(owner.span, "it is not what the clause before is about"));
         }
@@ -286,9 +325,110 @@ impl Interpretation<'_> {
         Ok(true)
     }
 
+    /// "each" said of what covers what the clause before is about.
+    fn cover_meant(&self, object: &NounPhrase) -> NounPhrase {
+        let mut object = object.clone();
+        if object.elided && object.noun.is_none() && matches!(self.drafts.last(), Some(draft) if uncovers(&draft.subtask.goal))
+        {
+            object.noun = self.noun_before(&Role::Affordance(COVERING), false);
+        }
+        object
+    }
+
+    /// The things over which something was put last.
+    fn covered_before(&self) -> Option<ReferenceIndex> {
+        self.drafts.iter().rev().find_map(|draft| match &draft.subtask.goal {
+            Goal::Each { members, body, .. } => match body.first() {
+                Some(Goal::State { predicate, holds: true, .. }) if predicate == "covered" => Some(*members),
+                _ => None,
+            },
+            Goal::State { predicate, object, holds: true, .. } if predicate == "covered" => Some(*object),
+            _ => None,
+        })
+    }
+
+    /// "Put a lid on every cube", "put the lids over the cubes": each of them is covered, with whichever.
+    fn covered_with(&mut self, clause: &Clause) -> Result<Option<Goal>, ParseError> {
+        let (FrameGoal::At, Some(object), Some(PlacePhrase { kind: PlaceKind::At(under, Relation::On), .. })) =
+            (&clause.goal, &clause.object, &clause.place)
+        else {
+            return Ok(None);
+        };
+        let covers = |phrase: &NounPhrase| {
+            phrase.noun.is_some() && Role::Affordance(COVERING).fits(self.library, phrase.noun.as_deref())
+        };
+        let plain = object.color.is_none() && object.located.is_none() && object.rank.is_none() && clause.also.is_empty();
+        if !under.several() || !covers(object) || !plain {
+            return Ok(None);
+        }
+        // Named, so that "them" and "each lid" have something to mean.
+        self.reference(object, &Role::Affordance(COVERING))?;
+        let members = self.reference(under, &Role::Mentioned)?;
+        let order = clause.modifier(ModifierKind::From).and_then(|modifier| modifier.side);
+        let covered = Goal::State { predicate: "covered".into(), object: members, holds: true, by: None };
+        let order = order.map_or(Ordering::Any, Ordering::From);
+        Ok(Some(Goal::Each { members, order, body: vec![covered] }))
+    }
+
+    /// "Put each piece where the other one was": the two change places.
+    fn each_others_place(&mut self, clause: &Clause) -> Result<Option<Vec<Goal>>, ParseError> {
+        let (FrameGoal::At, Some(object), Some(PlacePhrase { kind: PlaceKind::History(Some(owner), _), .. })) =
+            (&clause.goal, &clause.object, &clause.place)
+        else {
+            return Ok(None);
+        };
+        if !(object.several() && owner.other && (owner.noun.is_none() || owner.noun == object.noun)) {
+            return Ok(None);
+        }
+        let both = Clause { goal: FrameGoal::Exchange, place: None, ..clause.clone() };
+        self.exchange(&both).map(Some)
+    }
+
+    /// "Carry each cube to the mat and back": what is said of the one whose turn it is belongs to its turn.
+    pub(super) fn goes_on_with_each(&mut self, clause: &Clause) -> Result<bool, ParseError> {
+        let of_it = match &clause.object {
+            None => matches!(clause.goal, FrameGoal::At),
+            Some(object) => object.pronoun == Some(Pronoun::One) && clause.also.is_empty(),
+        };
+        let Some(Draft { each: true, subtask, .. }) = self.drafts.last() else { return Ok(false) };
+        let Goal::Each { members, body, .. } = &subtask.goal else { return Ok(false) };
+        let (members, moves) = (*members, body.iter().any(|goal| matches!(goal, Goal::At { .. } | Goal::Holding { .. })));
+        let carried = clause.object.as_ref().and_then(|object| self.carrier_meant(object, clause));
+        let fits = |known: &ObjectReference| Self::role_of(clause).fits(self.library, known.noun.as_deref());
+        let same_kind = matches!(clause.goal, FrameGoal::At | FrameGoal::Holding(_) | FrameGoal::State(..));
+        if !of_it || !moves || !same_kind || carried.is_some() || !self.references.get(members).is_some_and(fits) {
+            return Ok(false);
+        }
+        let mut goals = self.body(clause, members)?;
+        let side = clause.modifier(ModifierKind::From).and_then(|modifier| modifier.side);
+        if let Some(draft) = self.drafts.last_mut()
+            && let Goal::Each { body, order, .. } = &mut draft.subtask.goal
+        {
+            body.append(&mut goals);
+            if let (Ordering::Any, Some(side)) = (&order, side) {
+                *order = Ordering::From(side);
+            }
+            draft.subtask.span = draft.subtask.span.join(clause.span);
+            draft.subtask.text = draft.subtask.span.of(self.text).into();
+        }
+        for modifier in &clause.modifiers {
+            self.manner_of(modifier)?;
+        }
+        Ok(true)
+    }
+
     /// A group named before of which a thing is a member by its noun.
     fn group_like(&self, member: ReferenceIndex) -> Option<ReferenceIndex> {
         let noun = self.references.get(member)?.noun.clone()?;
         self.references.iter().rposition(|known| several(known) && known.noun.as_ref() == Some(&noun))
+    }
+}
+
+/// Whether a goal takes covers off.
+fn uncovers(goal: &Goal) -> bool {
+    match goal {
+        Goal::Each { body, .. } => body.iter().any(uncovers),
+        Goal::State { predicate, holds: false, .. } => predicate == "covered",
+        _ => false,
     }
 }

@@ -44,6 +44,7 @@ pub(super) fn interpret(
             Sentence::Manner { modifier } => reading.manner(modifier)?,
         }
     }
+    reading.check_signs()?;
     if reading.drafts.is_empty() {
         return Err(ParseError::Empty);
     }
@@ -59,6 +60,10 @@ pub(super) fn interpret(
 struct Draft {
     subtask: Subtask,
     guard: Option<usize>,
+    /// Whether something must say when what is tried is right.
+    needs_sign: bool,
+    /// Whether the clause speaks of each member by itself ("each cube"): "it" is the one whose turn it is.
+    each: bool,
 }
 
 struct Interpretation<'a> {
@@ -91,10 +96,17 @@ impl Interpretation<'_> {
         if clause.modifier(ModifierKind::EachTry).is_some() || self.tries(clause) {
             return self.probe(clause);
         }
-        if self.belongs_together(clause)? {
+        if self.belongs_together(clause)? || self.goes_on_with_each(clause)? {
             return Ok(());
         }
         let goals = self.goals(clause)?;
+        if let ([Goal::Find { members, vary, .. }], Some(Goal::Find { members: before, vary: known, probe: None, sign: None, .. })) =
+            (goals.as_slice(), self.drafts.last().map(|draft| &draft.subtask.goal))
+            && (members, vary) == (before, known)
+        {
+            // "Find the secret order of the cubes: put them into one order after another".
+            self.drafts.pop();
+        }
         if background
             && goals.iter().all(|goal| self.drafts.iter().any(|d| same_but_times(&d.subtask.goal, goal, clause)))
         {
@@ -102,12 +114,15 @@ impl Interpretation<'_> {
         }
         let at = self.place_in_order(order);
         let guard = guard.map(|guard| guard.number);
+        let needs_sign = self.lexicon.frames.get(clause.frame).is_some_and(|frame| frame.needs_sign);
+        let each = clause.object.as_ref().is_some_and(|object| object.each || object.several());
         let drafts = goals.into_iter().map(|goal| {
             let subtask = Subtask { when: when.clone(), ..self.subtask(clause.span, goal) };
-            Draft { subtask, guard }
+            Draft { subtask, guard, needs_sign, each }
         });
         let drafts: Vec<Draft> = drafts.collect();
         self.drafts.splice(at..at, drafts);
+        self.name_order();
         for modifier in &clause.modifiers {
             self.manner_of(modifier)?;
         }
@@ -149,6 +164,7 @@ impl Interpretation<'_> {
                 }
                 Ok(())
             }
+            (ModifierKind::MayTurn, Some(Goal::Find { vary: crate::task::Variation::Heading, .. })) => Ok(()),
             (ModifierKind::Until, Some(Goal::Find { sign: None, .. })) => self.sign(modifier),
             (
                 ModifierKind::OneAtATime | ModifierKind::OneToAPlace | ModifierKind::Aside | ModifierKind::TakesPlace,
@@ -188,6 +204,53 @@ impl Interpretation<'_> {
         if taken { Ok(()) } else { Err(self.unsupported(span, "only things that change places take over a heading")) }
     }
 
+    /// "Uncover the cubes, first the red one, then the green one": members named one after the other are the order in
+    /// which the group before is taken.
+    fn name_order(&mut self) {
+        let mut kept: Vec<Draft> = Vec::with_capacity(self.drafts.len());
+        for draft in std::mem::take(&mut self.drafts) {
+            if let Some(last) = kept.last_mut()
+                && last.guard == draft.guard
+                && let Some(named) = self.named_member(&last.subtask.goal, &draft.subtask.goal)
+                && let Goal::Each { order, .. } = &mut last.subtask.goal
+            {
+                match order {
+                    Ordering::Named(members) => members.push(named),
+                    _ => *order = Ordering::Named(vec![named]),
+                }
+                last.subtask.span = last.subtask.span.join(draft.subtask.span);
+                last.subtask.text = last.subtask.span.of(self.text).into();
+                continue;
+            }
+            kept.push(draft);
+        }
+        self.drafts = kept;
+    }
+
+    /// The member of a group that a goal singles out for what was just said of all of them.
+    fn named_member(&self, group: &Goal, goal: &Goal) -> Option<ReferenceIndex> {
+        let Goal::Each { members, order: Ordering::Any | Ordering::Named(_), body } = group else { return None };
+        let (Some(Goal::State { predicate, holds, .. }), Goal::State { predicate: same, object, holds: also, .. }) =
+            (body.first(), goal)
+        else {
+            return None;
+        };
+        let noun = |index: ReferenceIndex| self.references.get(index).and_then(|known| known.noun.as_deref());
+        (predicate == same && holds == also && !self.quantity_several(*object) && noun(*members) == noun(*object))
+            .then_some(*object)
+    }
+
+    /// Refuses what would be tried without end in sight.
+    fn check_signs(&self) -> Result<(), ParseError> {
+        let endless = |draft: &&Draft| {
+            draft.needs_sign && matches!(draft.subtask.goal, Goal::Find { probe: None, sign: None, .. })
+        };
+        match self.drafts.iter().find(endless) {
+            Some(draft) => Err(self.unsupported(draft.subtask.span, "it does not say what shows that it is right")),
+            None => Ok(()),
+        }
+    }
+
     fn unsupported(&self, span: Span, reason: &str) -> ParseError {
         ParseError::Unsupported { text: span.of(self.text).into(), span, reason: reason.into() }
     }
@@ -201,6 +264,21 @@ impl Interpretation<'_> {
     fn drop_parts_of_moves(&mut self) {
         let mut kept: Vec<Draft> = Vec::with_capacity(self.drafts.len());
         for mut draft in std::mem::take(&mut self.drafts) {
+            if let Some(last) = kept.last()
+                && let Goal::Each { order: order @ Ordering::From(_), .. } = &last.subtask.goal
+                && begins(&last.subtask.goal, &draft.subtask.goal)
+                && let Goal::Each { order: own @ Ordering::Any, .. } = &mut draft.subtask.goal
+            {
+                *own = order.clone();
+            }
+            if let (
+                Some(Goal::Each { body, .. }),
+                Goal::Find { vary: crate::task::Variation::Heading, within: within @ None, .. },
+            ) = (kept.last().map(|last| &last.subtask.goal), &mut draft.subtask.goal)
+                && let [Goal::At { destination, .. }] = body.as_slice()
+            {
+                *within = Some(destination.clone());
+            }
             if let Some(last) = kept.last()
                 && begins(&last.subtask.goal, &draft.subtask.goal)
                 && last.guard == draft.guard
@@ -228,6 +306,14 @@ fn begins(goal: &Goal, next: &Goal) -> bool {
         (Goal::Holding { object: taken, held: true }, Goal::Holding { object, held: true }) => taken == object,
         (Goal::Each { members: taken, body: first, .. }, Goal::Each { members, body: then, .. }) => {
             taken == members && matches!((first.as_slice(), then.first()), ([only], Some(next)) if begins(only, next))
+        }
+        // What is put somewhere is where it is then tried which way round it belongs.
+        (
+            Goal::Each { members: put, body, .. },
+            Goal::Find { members, vary: crate::task::Variation::Heading, within, .. },
+        ) => {
+            let [Goal::At { destination, .. }] = body.as_slice() else { return false };
+            put == members && within.as_ref().is_none_or(|within| within == destination)
         }
         _ => false,
     }

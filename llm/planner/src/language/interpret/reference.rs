@@ -5,7 +5,7 @@ use crate::{
     language::{
         CONTAINS, ParseError, SUPPORTIVE,
         role::Role,
-        syntax::{NounPhrase, Pronoun},
+        syntax::{NounPhrase, PlaceKind, PlacePhrase, Pronoun, Relation},
     },
     lexicon::FrameGoal,
     task::{Destination, Goal, Handled, ObjectReference, Quantity, ReferenceIndex, Span, functions_with_effect},
@@ -27,8 +27,16 @@ impl Interpretation<'_> {
             None => {}
         }
         let mut phrase = phrase.clone();
-        if phrase.elided && phrase.noun.is_none() {
-            phrase.noun = self.noun_before(role);
+        if phrase.elided && phrase.noun.is_none() && phrase.twin_of.is_none() {
+            phrase.noun = self.noun_before(role, phrase.several());
+        }
+        // "the same thing from the table": not the one that was named at its own place, but one that looks like it.
+        if phrase.same && phrase.somewhere && phrase.twin_of.is_none() {
+            let model = NounPhrase { same: false, somewhere: false, ..phrase.clone() };
+            let known = self.named_before(&model, role)?;
+            if known.and_then(|index| self.references.get(index)).is_some_and(|known| known.located.is_some()) {
+                phrase.twin_of = Some(Box::new(model));
+            }
         }
         self.check_role(&phrase, role)?;
         if let Some(known) = self.named_before(&phrase, role)? {
@@ -91,7 +99,11 @@ impl Interpretation<'_> {
     }
 
     fn described_place(&mut self, phrase: &NounPhrase) -> Result<Option<Box<Destination>>, ParseError> {
-        Ok(match &phrase.located {
+        Ok(match phrase.located.as_deref() {
+            // What stands on one of several stands on them; as a destination that would say too little.
+            Some(PlacePhrase { kind: PlaceKind::At(phrase, Relation::On | Relation::In), .. }) if phrase.several() => {
+                Some(Box::new(Destination::On { reference: self.reference(phrase, &Role::Mentioned)? }))
+            }
             Some(place) => Some(Box::new(self.destination(place, None)?)),
             None => None,
         })
@@ -117,8 +129,10 @@ impl Interpretation<'_> {
     }
 
     /// The noun of the thing named last that can play the role.
-    fn noun_before(&self, role: &Role) -> Option<String> {
-        let fits = |known: &&ObjectReference| known.noun.is_some() && role.fits(self.library, known.noun.as_deref());
+    pub(super) fn noun_before(&self, role: &Role, group: bool) -> Option<String> {
+        let fits = |known: &&ObjectReference| {
+            known.noun.is_some() && role.fits(self.library, known.noun.as_deref()) && (!group || several(known))
+        };
         self.references.iter().rev().find(fits).and_then(|known| known.noun.clone())
     }
 
@@ -158,7 +172,7 @@ impl Interpretation<'_> {
         }
         let same_kind = |known: &ObjectReference| match (&phrase.noun, &known.noun) {
             (Some(a), Some(b)) => {
-                a == b || self.library.with_noun(a).any(|t| self.library.with_noun(b).any(|other| other.name == t.name))
+                self.same_kind(a, b)
             }
             _ => true,
         };
@@ -166,6 +180,11 @@ impl Interpretation<'_> {
         let named = self.references.iter().enumerate().filter(|(_, reference)| single(reference));
         let others: Vec<ReferenceIndex> = named.map(|(index, _)| index).collect();
         if others.is_empty() { Err(self.no_antecedent(phrase.span)) } else { Ok(others) }
+    }
+
+    /// Whether two nouns may name one thing.
+    pub(super) fn same_kind(&self, a: &str, b: &str) -> bool {
+        a == b || self.library.with_noun(a).any(|t| self.library.with_noun(b).any(|other| other.name == t.name))
     }
 
     /// What a pronoun stands for: the thing acted on last that can play the role.
