@@ -96,6 +96,8 @@ const FORLORN_COST: f64 = 100.0;
 const OPENED: [f64; 2] = [0.25, 0.65];
 /// Rough fits look at every so many-th point.
 const ROUGHLY: usize = 2;
+/// A segment that is not longer than this many times its width may be a thing that is wider than long.
+const NEARLY_SQUARE: f64 = 1.3;
 /// Starts that are fitted of each template.
 const STARTS: usize = 2;
 
@@ -219,7 +221,13 @@ impl<'a> Starts<'a> {
             let across = rest.map(|_| (rectangle, sides(rectangle).yx()));
             std::iter::once((rectangle, sides(rectangle))).chain(across)
         };
+        let square = rectangles.iter().filter(|r| r.length < NEARLY_SQUARE * r.width);
+        let quarter_turned: Vec<Rectangle> = square.map(|r| Rectangle { yaw: r.yaw + FRAC_PI_2, ..*r }).collect();
         let mut starts: Vec<_> = rectangles.iter().flat_map(ways).flat_map(start_at).collect();
+        // What is about as wide as long may have its longer side across.
+        if rest.is_none() && starts.first().is_some_and(|(model, _)| model.has_two_sides()) {
+            starts.extend(quarter_turned.iter().flat_map(ways).flat_map(start_at));
+        }
         // A thing whose two ends differ may lie either way round.
         if starts.first().is_some_and(|(model, _)| model.has_two_ends()) {
             let turned = |r: &Rectangle| Rectangle { yaw: r.yaw + std::f64::consts::PI, ..*r };

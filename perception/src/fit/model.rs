@@ -28,8 +28,9 @@ pub(crate) struct Model<'a> {
     pub template: &'a Template,
     /// Whether the heading is fitted.
     pub turns: bool,
-    /// Whether half a turn makes a difference.
+    /// Whether half a turn makes a difference, and whether a quarter turn does.
     two_ends: bool,
+    two_sides: bool,
     pub base: Base,
     /// How it lies; `None` for upright.
     pub rest: Option<&'a Rest>,
@@ -59,7 +60,17 @@ impl<'a> Model<'a> {
         let symmetry = template.yaw_symmetry(&template.named(&initial)).ok()?;
         let free = (0..template.parameters.len()).filter(|&i| !template.parameters[i].fixed).collect();
         let two_ends = matches!(symmetry, YawSymmetry::Fold(fold) if fold % 2 == 1);
-        Some(Model { template, turns: symmetry != YawSymmetry::Continuous, two_ends, base, rest: None, free, initial })
+        let two_sides = matches!(symmetry, YawSymmetry::Fold(fold) if fold % 4 != 0);
+        Some(Model {
+            template,
+            turns: symmetry != YawSymmetry::Continuous,
+            two_ends,
+            two_sides,
+            base,
+            rest: None,
+            free,
+            initial,
+        })
     }
     /// The model in another rest.
     pub fn lying(self, rest: Option<&'a Rest>) -> Model<'a> {
@@ -73,6 +84,10 @@ impl<'a> Model<'a> {
     /// Whether half a turn makes a difference.
     pub fn has_two_ends(&self) -> bool {
         self.two_ends
+    }
+    /// Whether a quarter turn makes a difference.
+    pub fn has_two_sides(&self) -> bool {
+        self.two_sides
     }
     /// Index of the heading in the state.
     pub fn yaw_index(&self) -> Option<usize> {
