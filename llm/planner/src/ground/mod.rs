@@ -14,7 +14,12 @@ use crate::{
     lexicon::Lexicon,
     task::{ReferenceIndex, Task},
 };
-use acm_concept::{ids::ObjectId, pose::Pose, template::Template};
+use acm_concept::{
+    ids::ObjectId,
+    literal::{Literal, Term, Truth},
+    pose::Pose,
+    template::Template,
+};
 use acm_memory::{
     MemoryView,
     entry::{Moment, ObjectEntry, Presence},
@@ -27,6 +32,8 @@ use std::{
 pub(crate) use history::place_at;
 pub(crate) use place::{like_places, surface_under};
 
+/// Confidence from which a thing was clearly seen, though once.
+const CLEARLY_SEEN: f64 = 0.4;
 /// How far from a destination still counts as there, metres.
 pub(crate) const PLACE_TOLERANCE_M: f64 = 0.03;
 /// How far from a wanted heading still counts as right, radians.
@@ -113,9 +120,11 @@ impl<'a> Grounder<'a> {
         self.task.references.get(index).map_or("it", |reference| reference.phrase.as_str())
     }
     /// Where some of several things are confirmed and others are not: looks as long as looks are left, then goes
-    /// by those that are. A plan may rest on what is unconfirmed only where nothing better exists.
+    /// by those that are. A plan may rest on what is unconfirmed only where nothing better exists, or where it was clearly
+    /// seen and is hidden now, so that no look can confirm it.
     pub(super) fn confirmed<'e>(&self, entries: Vec<&'e ObjectEntry>) -> Result<Vec<&'e ObjectEntry>, Stuck> {
-        let (confirmed, others): (Vec<_>, Vec<_>) = entries.iter().copied().partition(|entry| entry.verified);
+        let stands = |entry: &&ObjectEntry| entry.verified || self.is_hidden(entry);
+        let (confirmed, others): (Vec<_>, Vec<_>) = entries.iter().copied().partition(stands);
         match (confirmed.is_empty(), others.first()) {
             (false, Some(other)) if self.may_look => {
                 let text = format!("{} {} is not confirmed by a second view yet", other.category, other.id);
@@ -124,6 +133,12 @@ impl<'a> Grounder<'a> {
             (false, Some(_)) => Ok(confirmed),
             _ => Ok(entries),
         }
+    }
+    /// Whether a thing that was clearly seen is behind something or outside the view now.
+    fn is_hidden(&self, entry: &ObjectEntry) -> bool {
+        let visible = Literal::new("visible", vec![Term::Object(entry.id)]);
+        let clear = entry.presence == Presence::Present && entry.confidence >= CLEARLY_SEEN;
+        clear && self.view.belief(&visible).truth == Truth::No
     }
     /// When a subtask began; `None` for one that has not.
     pub fn began(&self, subtask: u32) -> Option<Moment> {
