@@ -24,7 +24,7 @@ BUGS = [
     ("a dropped object stays in the columns", "state.rs", "            self.table.kill(row);\n            self.is_still = false;", "            self.is_still = false;"),
     ("a block's bound is too low", "execute.rs", "bounds.weight - distance / near", "bounds.weight - 0.2 - distance / near"),
     ("a set forgets a block", "table.rs", "if member && number < self.base && !self", "if !member && number < self.base && !self"),
-    ("a late report overwrites a newer one", "state.rs", "let late = context.valid < heads.latest[at];", "let late = false;"),
+    ("a late report overwrites a newer one", "state.rs", "let late = context.valid < heads.of[at].latest;", "let late = false;"),
     ("odd moments are lost when changes are sorted", "history.rs", ".map(|place| (*place, *moment))", ".map(|_| (u32::MAX, *moment))"),
     ("another region costs an object its states", "state.rs", "        sets.into_iter().for_each(|set| self.table.put(new, set, true));", "        drop(sets);"),
     ("compaction drops a moment that is not superseded", "compact.rs", "*later >= valid", "*later > 0"),

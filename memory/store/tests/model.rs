@@ -270,6 +270,8 @@ fn no_block_is_passed_over_that_holds_a_hit() {
         match number % 8 {
             1 | 3 => query.near = near,
             4 => query.region = None,
+            // So wide that confidence decides: the best lie in all blocks.
+            5 => query = Query { near: near.map(|near| Near { scale_m: 50.0, ..near }), ..Query::default() },
             6 => query.categories.clear(),
             _ => {}
         }
