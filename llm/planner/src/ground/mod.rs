@@ -25,7 +25,7 @@ use std::{
 };
 
 pub(crate) use history::place_at;
-pub(crate) use place::{like_places, surface_under};
+pub(crate) use place::{carrying_centre, like_places, slots, surface_under};
 
 /// How far from a destination still counts as there, metres.
 pub(crate) const PLACE_TOLERANCE_M: f64 = 0.03;

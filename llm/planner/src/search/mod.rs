@@ -57,6 +57,8 @@ pub(crate) struct Limits {
     pub spent: BTreeMap<(String, ObjectId), String>,
     /// Objects that must not be acted on.
     pub untouched: Vec<ObjectId>,
+    /// What the instruction names as a place for what has to be put aside.
+    pub aside: Vec<ObjectId>,
 }
 
 /// A plan, and what was considered on the way.
@@ -202,7 +204,9 @@ impl<'v> Search<'v, '_> {
                     return None;
                 }
                 Item::PutAside(object) => {
-                    let Some(spot) = node.state.free_spot(object, &self.spoken_for(&node.agenda)) else {
+                    let spoken_for = self.spoken_for(&node.agenda);
+                    let named = self.limits.aside.iter().find_map(|on| node.state.spot_on(*on, object, &spoken_for));
+                    let Some(spot) = named.or_else(|| node.state.free_spot(object, &spoken_for)) else {
                         self.reject(format!("moving {object} away"), None, "I see no free spot for it".into());
                         return None;
                     };
