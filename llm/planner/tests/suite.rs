@@ -271,7 +271,7 @@ fn two_cubes_change_trays_by_way_of_the_free_one() {
         });
         assert_eq!(stops.last(), Some(&(Some(trays[1]), Some(trays[0]))));
         let aside = stops.iter().filter(|stop| stop.0 == Some(trays[2]) || stop.1 == Some(trays[2])).count();
-        assert!(aside >= 1, "the free tray was used: {stops:?}");
+        assert!(aside >= 1, "the free tray was used: {stops:?}, start {start}");
         assert_eq!(world.done_skills.len(), 7, "{:?}", world.done_skills);
         assert_eq!(presses(&world, button), 1);
     }

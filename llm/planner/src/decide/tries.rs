@@ -2,9 +2,9 @@
 
 use super::Mind;
 use crate::{
-    task::MannerKind,
     decision::{GiveUpCause, Unknown},
     search::{Limits, brings_about},
+    task::MannerKind,
 };
 use acm_concept::{
     ids::ObjectId,

@@ -1,6 +1,5 @@
 //! What is or is not so, and what follows a clause and says how it is meant.
 
-
 use super::{
     phrase::keep_longest_first,
     reader::{Captures, Reader},

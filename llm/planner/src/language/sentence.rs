@@ -113,7 +113,9 @@ impl Reader<'_> {
         let mut start = at;
         while let Some((mut modifier, end)) = self.clause_modifier(start) {
             let belongs = match modifier.kind {
-                ModifierKind::From | ModifierKind::OneAtATime | ModifierKind::OneToAPlace | ModifierKind::EachTry => fresh,
+                ModifierKind::From | ModifierKind::OneAtATime | ModifierKind::OneToAPlace | ModifierKind::EachTry => {
+                    fresh
+                }
                 ModifierKind::Aside | ModifierKind::ThatOrder | ModifierKind::Shown => fresh,
                 ModifierKind::ShownFirst => true,
                 _ => false,

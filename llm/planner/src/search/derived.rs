@@ -82,7 +82,9 @@ pub(super) fn concluded(state: &State<'_>, literal: &Literal) -> Option<Belief> 
 fn shown(view: &dyn MemoryView, predicate: &str) -> Option<Belief> {
     let present = view.objects().iter().filter(|entry| entry.presence == Presence::Present);
     let said: Vec<(bool, String)> = match predicate {
-        "accepted" => present.filter_map(lamp).map(|(id, color)| (color == ASSENT, format!("{id} shows {color}"))).collect(),
+        "accepted" => {
+            present.filter_map(lamp).map(|(id, color)| (color == ASSENT, format!("{id} shows {color}"))).collect()
+        }
         "changed" => present
             .filter_map(|entry| {
                 let belief = view.belief(&Literal::new("changed", vec![Term::Object(entry.id)]));

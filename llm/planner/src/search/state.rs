@@ -1,8 +1,7 @@
 //! What would be so after some steps: memory's beliefs with the steps' effects laid over them.
 
 use crate::ground::{
-    PLACE_TOLERANCE_M,
-    carrying_centre,
+    PLACE_TOLERANCE_M, carrying_centre,
     geometry::{Extent, symmetry},
     has_effect, surface_under,
 };
@@ -256,7 +255,8 @@ impl<'v> State<'v> {
     pub fn spot_on(&self, carrier: ObjectId, object: ObjectId, reserved: &[(ObjectId, Place)]) -> Option<Place> {
         let (under, moved) = (self.view.object(carrier)?, self.view.object(object)?);
         let outline = Extent::at(self.view, under, &self.standing(under)?)?;
-        let wanted = |(_, place): &(ObjectId, Place)| place.support == Some(carrier) || outline.covers(flat(&place.pose));
+        let wanted =
+            |(_, place): &(ObjectId, Place)| place.support == Some(carrier) || outline.covers(flat(&place.pose));
         if carrier == object || !self.carried_by(carrier).is_empty() || reserved.iter().any(wanted) {
             return None;
         }

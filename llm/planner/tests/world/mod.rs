@@ -414,7 +414,9 @@ impl World {
                 (Presence::Held, _) => false,
                 _ => return None,
             },
-            other if !literal.arguments.is_empty() && self.visible.contains(other) => self.facts.contains(&literal.to_string()),
+            other if !literal.arguments.is_empty() && self.visible.contains(other) => {
+                self.facts.contains(&literal.to_string())
+            }
             _ => return None,
         })
     }

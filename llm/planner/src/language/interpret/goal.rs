@@ -328,7 +328,9 @@ impl Interpretation<'_> {
     /// "each" said of what covers what the clause before is about.
     fn cover_meant(&self, object: &NounPhrase) -> NounPhrase {
         let mut object = object.clone();
-        if object.elided && object.noun.is_none() && matches!(self.drafts.last(), Some(draft) if uncovers(&draft.subtask.goal))
+        if object.elided
+            && object.noun.is_none()
+            && matches!(self.drafts.last(), Some(draft) if uncovers(&draft.subtask.goal))
         {
             object.noun = self.noun_before(&Role::Affordance(COVERING), false);
         }
@@ -357,7 +359,8 @@ impl Interpretation<'_> {
         let covers = |phrase: &NounPhrase| {
             phrase.noun.is_some() && Role::Affordance(COVERING).fits(self.library, phrase.noun.as_deref())
         };
-        let plain = object.color.is_none() && object.located.is_none() && object.rank.is_none() && clause.also.is_empty();
+        let plain =
+            object.color.is_none() && object.located.is_none() && object.rank.is_none() && clause.also.is_empty();
         if !under.several() || !covers(object) || !plain {
             return Ok(None);
         }
@@ -392,7 +395,8 @@ impl Interpretation<'_> {
         };
         let Some(Draft { each: true, subtask, .. }) = self.drafts.last() else { return Ok(false) };
         let Goal::Each { members, body, .. } = &subtask.goal else { return Ok(false) };
-        let (members, moves) = (*members, body.iter().any(|goal| matches!(goal, Goal::At { .. } | Goal::Holding { .. })));
+        let (members, moves) =
+            (*members, body.iter().any(|goal| matches!(goal, Goal::At { .. } | Goal::Holding { .. })));
         let carried = clause.object.as_ref().and_then(|object| self.carrier_meant(object, clause));
         let fits = |known: &ObjectReference| Self::role_of(clause).fits(self.library, known.noun.as_deref());
         let same_kind = matches!(clause.goal, FrameGoal::At | FrameGoal::Holding(_) | FrameGoal::State(..));

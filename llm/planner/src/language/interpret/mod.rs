@@ -100,8 +100,10 @@ impl Interpretation<'_> {
             return Ok(());
         }
         let goals = self.goals(clause)?;
-        if let ([Goal::Find { members, vary, .. }], Some(Goal::Find { members: before, vary: known, probe: None, sign: None, .. })) =
-            (goals.as_slice(), self.drafts.last().map(|draft| &draft.subtask.goal))
+        if let (
+            [Goal::Find { members, vary, .. }],
+            Some(Goal::Find { members: before, vary: known, probe: None, sign: None, .. }),
+        ) = (goals.as_slice(), self.drafts.last().map(|draft| &draft.subtask.goal))
             && (members, vary) == (before, known)
         {
             // "Find the secret order of the cubes: put them into one order after another".

@@ -171,9 +171,7 @@ impl Interpretation<'_> {
             return Ok(Vec::new());
         }
         let same_kind = |known: &ObjectReference| match (&phrase.noun, &known.noun) {
-            (Some(a), Some(b)) => {
-                self.same_kind(a, b)
-            }
+            (Some(a), Some(b)) => self.same_kind(a, b),
             _ => true,
         };
         let single = |reference: &&ObjectReference| !several(reference) && same_kind(reference);
