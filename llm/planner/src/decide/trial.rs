@@ -6,7 +6,7 @@
 use super::{Grounded, MAX_LOOKS, Mind, goals::Next};
 use crate::{
     decision::GiveUpCause,
-    ground::{HEADING_TOLERANCE_RAD, PLACE_TOLERANCE_M, Stuck, missing, place_at},
+    ground::{HEADING_TOLERANCE_RAD, PLACE_TOLERANCE_M, Stuck, missing, place_at, slots},
     search::Want,
     task::{Condition, Destination, Goal, Ordering, ReferenceIndex, Variation},
 };
@@ -16,7 +16,7 @@ use acm_concept::{
     pose::Pose,
 };
 use acm_memory::entry::{Moment, ObjectEntry, Presence};
-use std::f64::consts::PI;
+use std::f64::consts::{FRAC_PI_2, PI};
 
 /// More ways than this are not tried.
 const MAX_HYPOTHESES: usize = 128;
@@ -38,6 +38,8 @@ impl Mind<'_> {
         if let Some(member) = members.iter().find(gone) {
             return Err(missing(*member, self.ground.phrase(group)));
         }
+        // What is shown before anything was tried says nothing of a try.
+        let sign = sign.filter(|_| probe.is_none_or(|probe| self.was_done(probe)));
         let seen = match self.sign(sign)? {
             Sign::Shows(reason) => return Ok(Next::Reached(reason)),
             Sign::Look(reason) => return Ok(Next::Look(reason)),
@@ -70,6 +72,14 @@ impl Mind<'_> {
         let wants = literals.iter().map(|(literal, _)| Want::Holds(literal.clone())).collect();
         let times = (ways.len() * members.len()) as u32;
         Ok(Next::Pursue(Box::new(Grounded { wants, literals, times, guessed: false })))
+    }
+
+    /// Whether something was done to try in this subtask.
+    fn was_done(&self, probe: &Goal) -> bool {
+        match probe {
+            Goal::Performed { function, .. } => self.successes(self.since()).any(|t| t.skill() == function),
+            _ => true,
+        }
     }
 
     fn sign(&self, sign: Option<&Condition>) -> Result<Sign, Stuck> {
@@ -151,8 +161,13 @@ impl Mind<'_> {
     ) -> Result<Vec<Arrangement>, Stuck> {
         let began = Some(self.since());
         let mut homes: Vec<Place> = Vec::with_capacity(members.len());
+        let mut slots = match within {
+            Some(Destination::In { reference }) => self.slots(*reference, members)?.into_iter(),
+            _ => Vec::new().into_iter(),
+        };
         for member in members {
             let place = match within {
+                Some(Destination::In { .. }) => slots.next().ok_or_else(|| missing(*member, "a slot for it"))?,
                 Some(destination) => self.ground.destination(destination, *member, self.current)?.value,
                 None => {
                     let stood = self.view.object(*member).and_then(|entry| place_at(entry, began));
@@ -184,6 +199,37 @@ impl Mind<'_> {
             homes.iter().enumerate().map(way_round).collect()
         };
         Ok((0..1usize << members.len()).map(turned).collect())
+    }
+
+    /// Where the members belong in a thing, one slot each: slot and member from left to right, so that none has to cross.
+    fn slots(&self, holder: ReferenceIndex, members: &[ObjectId]) -> Result<Vec<Place>, Stuck> {
+        let (id, phrase) = (self.ground.object(holder)?.value, self.ground.phrase(holder));
+        let found = self.view.object(id).and_then(|entry| slots(self.view, entry, members.len()));
+        let mut poses = found.ok_or_else(|| missing(id, phrase))?;
+        poses.sort_by(|a, b| a.translation.x.total_cmp(&b.translation.x));
+        let began = Some(self.since());
+        let stood = |member: ObjectId| {
+            self.view.object(member).and_then(|entry| place_at(entry, began)).map_or(Pose::IDENTITY, |(pose, _)| pose)
+        };
+        let mut order: Vec<usize> = (0..members.len()).collect();
+        let starts: Vec<Pose> = members.iter().map(|member| stood(*member)).collect();
+        let start = |index: &usize| starts.get(*index).copied().unwrap_or_default();
+        order.sort_by(|a, b| start(a).translation.x.total_cmp(&start(b).translation.x));
+        let apart = poses.windows(2).map(|pair| match pair {
+            [a, b] => a.translation.truncate().distance(b.translation.truncate()),
+            _ => f64::INFINITY,
+        });
+        let tolerance_m = apart.fold(PLACE_TOLERANCE_M, |least, apart| least.min(0.4 * apart));
+        let mut places: Vec<(usize, Place)> = Vec::with_capacity(members.len());
+        for (index, slot) in order.into_iter().zip(poses) {
+            // As it lies, or turned by less than a quarter turn, comes first.
+            let turn = acm_concept::pose::wrap_angle(slot.yaw() - start(&index).yaw());
+            let yaw = if turn.abs() > FRAC_PI_2 { slot.yaw() + PI } else { slot.yaw() };
+            let pose = Pose::from_yaw(slot.translation, yaw);
+            places.push((index, Place { support: Some(id), pose, tolerance_m, heading_tolerance_rad: None }));
+        }
+        places.sort_by_key(|(index, _)| *index);
+        Ok(places.into_iter().map(|(_, place)| place).collect())
     }
 
     /// Which ways were tried: those that stood when the probe took effect, or, without a probe, all that ever stood.

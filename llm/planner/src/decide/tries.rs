@@ -4,6 +4,7 @@ use super::Mind;
 use crate::{
     decision::{GiveUpCause, Unknown},
     search::{Limits, brings_about},
+    task::MannerKind,
 };
 use acm_concept::{
     ids::ObjectId,
@@ -55,10 +56,19 @@ impl Mind<'_> {
         }
     }
 
+    /// What the instruction names as a place for what has to be put aside, as far as it can be told.
+    fn aside(&self) -> Vec<ObjectId> {
+        let named = self.task.manners.iter().filter_map(|manner| match manner.kind {
+            MannerKind::Aside(reference) => Some(reference),
+            MannerKind::OneAtATime | MannerKind::OneToAPlace => None,
+        });
+        named.filter_map(|reference| Some(self.ground.object(reference).ok()?.value)).collect()
+    }
+
     /// What may be tried again, from the tries of this subtask; with the last failure.
     pub(super) fn limits(&self, times: u32) -> (Limits, Option<Unknown>) {
         let mut tries: BTreeMap<(String, ObjectId), u32> = BTreeMap::new();
-        let mut limits = Limits { untouched: self.ground.untouched(), ..Limits::default() };
+        let mut limits = Limits { untouched: self.ground.untouched(), aside: self.aside(), ..Limits::default() };
         let mut last_failure = None;
         for transition in self.tries() {
             let tried = (transition.skill().to_owned(), transition.object());

@@ -1,6 +1,6 @@
 //! What a description says beside noun, colour and place: states, contents, twins, and what was done with a thing.
 
-use super::{Grounder, Stuck, geometry::volume, history::place_at};
+use super::{Grounder, Stuck, history::place_at};
 use crate::task::{Handled, ObjectReference};
 use acm_concept::{
     ids::ObjectId,
@@ -10,8 +10,10 @@ use acm_memory::entry::{Moment, ObjectEntry, TransitionResult};
 
 /// Surfaces within this delta E (CIE76) look alike.
 const TWIN_COLOR: f64 = 18.0;
-/// Volumes within this ratio look alike.
-const TWIN_VOLUME: f64 = 1.5;
+/// Lengths within this ratio look alike.
+const TWIN_LENGTH: f64 = 1.25;
+/// What is less alike than another by this much, in the measure of [`unlikeness`], is not meant.
+const TWIN_MARGIN: f64 = 0.3;
 
 impl<'a> Grounder<'a> {
     /// Keeps those that fit what else the description says.
@@ -25,7 +27,9 @@ impl<'a> Grounder<'a> {
         if let Some(model) = reference.twin_of {
             let model = self.object_at(model, depth + 1)?.value;
             if let Some(model) = self.view.object(model) {
-                contenders.retain(|entry| entry.id != model.id && self.looks_like(entry, model));
+                let unlike = |entry: &ObjectEntry| unlikeness(entry, model).filter(|_| entry.id != model.id);
+                let least = contenders.iter().filter_map(|entry| unlike(entry)).fold(f64::INFINITY, f64::min);
+                contenders.retain(|entry| unlike(entry).is_some_and(|much| much <= least + TWIN_MARGIN));
             }
         }
         for &content in &reference.contains {
@@ -51,14 +55,6 @@ impl<'a> Grounder<'a> {
         Ok(())
     }
 
-    fn looks_like(&self, entry: &ObjectEntry, model: &ObjectEntry) -> bool {
-        let template = |entry: &ObjectEntry| entry.parts.first().map(|part| part.template.clone());
-        let (a, b) = (volume(self.view, entry), volume(self.view, model));
-        template(entry) == template(model)
-            && entry.appearance.mean.distance(&model.appearance.mean) < TWIN_COLOR
-            && a.max(b) <= TWIN_VOLUME * a.min(b)
-    }
-
     /// The object that was the n-th of those with which the agent brought something about since it was instructed.
     fn handled(&self, handled: &Handled) -> Option<ObjectId> {
         let instructed = self.view.progress().instructed;
@@ -76,4 +72,26 @@ impl<'a> Grounder<'a> {
         };
         objects.get(number).copied()
     }
+}
+
+/// How much two things of one make differ: the largest difference, of colour or of a parameter, over what still looks alike.
+/// `None` for things of different makes, or that differ by more.
+fn unlikeness(entry: &ObjectEntry, model: &ObjectEntry) -> Option<f64> {
+    if entry.parts.len() != model.parts.len() {
+        return None;
+    }
+    let mut most = entry.appearance.mean.distance(&model.appearance.mean) / TWIN_COLOR;
+    for (part, like) in entry.parts.iter().zip(&model.parts) {
+        if part.template != like.template {
+            return None;
+        }
+        for parameter in &part.parameters {
+            let other = like.value(&parameter.name)?;
+            let (low, high) = (parameter.value.abs().min(other.abs()), parameter.value.abs().max(other.abs()));
+            if high > 0.0 {
+                most = most.max((high / low.max(f64::MIN_POSITIVE)).ln() / TWIN_LENGTH.ln());
+            }
+        }
+    }
+    (most <= 1.0).then_some(most)
 }

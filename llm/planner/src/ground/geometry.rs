@@ -58,6 +58,12 @@ impl Extent {
     pub fn covers(&self, point: DVec2) -> bool {
         self.outlines.iter().any(|outline| separation(outline, &[point]) <= 0.0)
     }
+    /// Length along an axis seen from above, metres; zero without outlines.
+    pub fn span(&self, axis: DVec2) -> f64 {
+        let along = self.outlines.iter().flatten().map(|corner| corner.dot(axis));
+        let (low, high) = along.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+        (high - low).max(0.0)
+    }
     /// Largest half extent seen from above, from the middle of the corners, metres.
     pub fn radius(&self) -> f64 {
         let corners: Vec<DVec2> = self.outlines.iter().flatten().copied().collect();

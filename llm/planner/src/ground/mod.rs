@@ -30,7 +30,7 @@ use std::{
 };
 
 pub(crate) use history::place_at;
-pub(crate) use place::{like_places, surface_under};
+pub(crate) use place::{carrying_centre, like_places, slots, surface_under};
 
 /// Confidence from which a thing was clearly seen, though once.
 const CLEARLY_SEEN: f64 = 0.4;

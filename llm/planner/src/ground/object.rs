@@ -193,10 +193,10 @@ impl<'a> Grounder<'a> {
         }
         if let Destination::On { reference } | Destination::In { reference } = destination {
             let under: Vec<(ObjectId, Option<Extent>)> = match self.reference(*reference)?.quantity {
-                Quantity::Group | Quantity::Count(_) => {
+                Quantity::Group | Quantity::Count(_) if self.turn(*reference).is_none() => {
                     self.group(*reference, depth + 1)?.iter().map(|e| (e.id, Extent::now(self.view, e))).collect()
                 }
-                Quantity::TheOne | Quantity::AnyOne => {
+                _ => {
                     let id = self.object_at(*reference, depth + 1)?.value;
                     vec![(id, self.view.object(id).and_then(|entry| Extent::now(self.view, entry)))]
                 }

@@ -9,6 +9,7 @@ use super::{
 };
 use crate::{
     decision::GiveUpCause,
+    language::CONTAINS,
     task::{Destination, Direction, ReferenceIndex},
 };
 use acm_concept::{ids::ObjectId, literal::Place, pose::Pose, task::OnUnknown};
@@ -18,11 +19,14 @@ use acm_memory::{
 };
 use glam::{DVec2, DVec3};
 use rand::Rng;
+use std::f64::consts::FRAC_PI_2;
 
 /// Free space left between things that are put beside each other, metres.
 const BESIDE_GAP_M: f64 = 0.03;
 /// Thickness that the floor of a container is taken to have, metres.
 const FLOOR_M: f64 = 0.004;
+/// What the names of frames begin with at which things belong into a thing.
+const SLOT: &str = "slot";
 /// Colours within this delta E (CIE76) count as alike.
 const LIKE_COLOR: f64 = 30.0;
 /// Areas within this ratio count as alike.
@@ -265,6 +269,42 @@ impl Grounder<'_> {
             heading_tolerance_rad: None,
         }
     }
+}
+
+/// Where things stand on a thing or in it, at its middle: the floor of what contains, else the top.
+pub(crate) fn carrying_centre(view: &dyn MemoryView, entry: &ObjectEntry) -> Option<Pose> {
+    let contains = entry.parts.iter().any(|part| part.affordances.iter().any(|affordance| affordance == CONTAINS));
+    if !contains {
+        return top_centre(view, entry);
+    }
+    let (pose, extent) = (entry.pose()?, Extent::now(view, entry)?);
+    Some(Pose::from_yaw(pose.translation.truncate().extend(extent.low + FLOOR_M), pose.yaw()))
+}
+
+/// Where `count` things belong in a thing: at the frames of its template that are slots, or, where it has fewer, side by
+/// side along its longer side, each lying across.
+pub(crate) fn slots(view: &dyn MemoryView, holder: &ObjectEntry, count: usize) -> Option<Vec<Pose>> {
+    let mut slots = Vec::new();
+    for part in &holder.parts {
+        let template = view.library().get(&part.template)?;
+        for name in template.frame_names().filter(|name| name.starts_with(SLOT)) {
+            slots.extend(template.frame(name, &part.values()).ok()?.map(|local| part.pose.pose * local));
+        }
+    }
+    if slots.len() >= count {
+        return Some(slots);
+    }
+    let centre = carrying_centre(view, holder)?;
+    let extent = Extent::now(view, holder)?;
+    let axis = |turn: f64| DVec2::from_angle(centre.yaw() + turn);
+    let turn = if extent.span(axis(0.0)) >= extent.span(axis(FRAC_PI_2)) { 0.0 } else { FRAC_PI_2 };
+    let (along, long) = (axis(turn), extent.span(axis(turn)));
+    let place = |index: usize| {
+        let offset = long * ((index as f64 + 0.5) / count as f64 - 0.5);
+        let spot = centre.translation.truncate() + along * offset;
+        Pose::from_yaw(spot.extend(centre.translation.z), centre.yaw() + turn + FRAC_PI_2)
+    };
+    Some((0..count).map(place).collect())
 }
 
 /// What carries a spot: the highest thing that is made to carry and cannot be taken away, or else the support

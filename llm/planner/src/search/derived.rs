@@ -22,6 +22,8 @@ const COVERING: &str = "covering";
 const CONTAINS: &str = "contains";
 /// Affordance of what stands before an inside and can be shut: a door, a lid.
 const CLOSABLE: &str = "closable";
+/// The colour of a lamp that says yes.
+const ASSENT: &str = "green";
 /// Covers that are considered for one thing, the nearest first.
 const MAX_COVERS: usize = 4;
 
@@ -40,6 +42,9 @@ fn affords(entry: &ObjectEntry, word: &str) -> bool {
 
 /// What follows for a positive literal from where things stand; `None` where nothing does.
 pub(super) fn concluded(state: &State<'_>, literal: &Literal) -> Option<Belief> {
+    if literal.arguments.is_empty() {
+        return shown(state.view(), &literal.predicate);
+    }
     let subject = literal.subject()?;
     let other = || match literal.arguments.get(1)? {
         Term::Object(id) => Some(*id),
@@ -70,6 +75,36 @@ pub(super) fn concluded(state: &State<'_>, literal: &Literal) -> Option<Belief> 
         }
         _ => None,
     }
+}
+
+/// What the things that show something say of the moment: `accepted` by a lamp's colour, `changed` by a needle or whatever
+/// else memory saw change. `None` where nothing shows.
+fn shown(view: &dyn MemoryView, predicate: &str) -> Option<Belief> {
+    let present = view.objects().iter().filter(|entry| entry.presence == Presence::Present);
+    let said: Vec<(bool, String)> = match predicate {
+        "accepted" => {
+            present.filter_map(lamp).map(|(id, color)| (color == ASSENT, format!("{id} shows {color}"))).collect()
+        }
+        "changed" => present
+            .filter_map(|entry| {
+                let belief = view.belief(&Literal::new("changed", vec![Term::Object(entry.id)]));
+                (belief.truth != Truth::Unknown).then(|| (belief.truth == Truth::Yes, belief.reason))
+            })
+            .collect(),
+        _ => return None,
+    };
+    let told = said.iter().find(|(holds, _)| *holds).or(said.first())?;
+    Some(inferred(told.0, told.1.clone()))
+}
+
+/// The colour that a thing shows, the last that was read.
+fn lamp(entry: &ObjectEntry) -> Option<(ObjectId, &str)> {
+    let shows = entry.state.iter().rev().filter(|literal| literal.predicate == "shows" && !literal.negated);
+    let mut words = shows.filter_map(|literal| match literal.arguments.get(1) {
+        Some(Term::Symbol(word)) => Some(word.as_str()),
+        _ => None,
+    });
+    words.next().map(|word| (entry.id, word))
 }
 
 fn inferred(holds: bool, reason: String) -> Belief {

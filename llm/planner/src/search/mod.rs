@@ -57,6 +57,8 @@ pub(crate) struct Limits {
     pub spent: BTreeMap<(String, ObjectId), String>,
     /// Objects that must not be acted on.
     pub untouched: Vec<ObjectId>,
+    /// What the instruction names as a place for what has to be put aside.
+    pub aside: Vec<ObjectId>,
 }
 
 /// A plan, and what was considered on the way.
@@ -202,7 +204,7 @@ impl<'v> Search<'v, '_> {
                     return None;
                 }
                 Item::PutAside(object) => {
-                    let Some(spot) = node.state.free_spot(object, &self.spoken_for(&node.agenda)) else {
+                    let Some(spot) = self.spot_aside(&node, object) else {
                         self.reject(format!("moving {object} away"), None, "I see no free spot for it".into());
                         return None;
                     };
@@ -244,6 +246,13 @@ impl<'v> Search<'v, '_> {
             _ => None,
         });
         self.reserved.iter().copied().chain(planned).collect()
+    }
+
+    /// Where a thing is put that has to be somewhere else: where the instruction says, if that is free, else on a free spot.
+    fn spot_aside(&self, node: &Node<'v>, object: ObjectId) -> Option<Place> {
+        let spoken_for = self.spoken_for(&node.agenda);
+        let named = self.limits.aside.iter().find_map(|on| node.state.spot_on(*on, object, &spoken_for));
+        named.or_else(|| node.state.free_spot(object, &spoken_for))
     }
 
     fn truth(&self, node: &Node<'v>, condition: &Condition) -> Truth {
@@ -341,7 +350,7 @@ impl<'v> Search<'v, '_> {
         let Some(object) = literal.subject().or_else(|| node.state.held()) else { return Vec::new() };
         let mut candidates = self.view.skill_candidates(object, destination);
         if destination.is_none() && node.state.held() == Some(object) {
-            let spot = node.state.free_spot(object, &self.spoken_for(&node.agenda));
+            let spot = self.spot_aside(node, object);
             candidates = self.view.skill_candidates(object, spot);
         }
         let declares = |candidate: &SkillCandidate| {

@@ -1,7 +1,7 @@
 //! What would be so after some steps: memory's beliefs with the steps' effects laid over them.
 
 use crate::ground::{
-    PLACE_TOLERANCE_M,
+    PLACE_TOLERANCE_M, carrying_centre,
     geometry::{Extent, symmetry},
     has_effect, surface_under,
 };
@@ -249,6 +249,24 @@ impl<'v> State<'v> {
             }
         }
         None
+    }
+
+    /// The place for an object on or in a thing that carries nothing and shall carry nothing else.
+    pub fn spot_on(&self, carrier: ObjectId, object: ObjectId, reserved: &[(ObjectId, Place)]) -> Option<Place> {
+        let (under, moved) = (self.view.object(carrier)?, self.view.object(object)?);
+        let outline = Extent::at(self.view, under, &self.standing(under)?)?;
+        let wanted =
+            |(_, place): &(ObjectId, Place)| place.support == Some(carrier) || outline.covers(flat(&place.pose));
+        if carrier == object || !self.carried_by(carrier).is_empty() || reserved.iter().any(wanted) {
+            return None;
+        }
+        let pose = carrying_centre(self.view, under)?;
+        Some(Place {
+            support: Some(carrier),
+            pose: Pose::from_yaw(pose.translation, moved.pose().map_or(pose.yaw(), |pose| pose.yaw())),
+            tolerance_m: PLACE_TOLERANCE_M,
+            heading_tolerance_rad: None,
+        })
     }
 
     fn place_at(&self, spot: DVec2, object: ObjectId, yaw: f64) -> Option<Place> {

@@ -194,7 +194,8 @@ impl World {
     pub fn button(&mut self, at: DVec2) -> ObjectId {
         self.add("button", &[("radius", 0.03), ("height", 0.02)], at, RED, None)
     }
-    fn add(
+    /// A thing of a template with these parameters.
+    pub fn add(
         &mut self,
         template: &str,
         values: &[(&str, f64)],
@@ -247,10 +248,23 @@ impl World {
         });
         id
     }
+    /// Turns a thing about the vertical as if it had been so from the beginning.
+    pub fn turn(&mut self, id: ObjectId, yaw: f64) {
+        let entry = self.entry_mut(id);
+        let pose = Pose::from_yaw(entry.parts[0].pose.pose.translation, yaw);
+        entry.parts[0].pose.pose = pose;
+        entry.history[0].place.as_mut().unwrap().pose = pose;
+    }
+    /// What can be read on a thing from now on.
+    pub fn shows(&mut self, id: ObjectId, what: &str) {
+        let state = &mut self.entry_mut(id).state;
+        state.retain(|literal| literal.predicate != "shows");
+        state.push(Literal::parse(&format!("shows({id}, {what})")).unwrap());
+    }
     pub fn entry(&self, id: ObjectId) -> &ObjectEntry {
         self.objects.iter().find(|entry| entry.id == id).unwrap()
     }
-    fn entry_mut(&mut self, id: ObjectId) -> &mut ObjectEntry {
+    pub fn entry_mut(&mut self, id: ObjectId) -> &mut ObjectEntry {
         self.objects.iter_mut().find(|entry| entry.id == id).unwrap()
     }
     pub fn spot(&self, id: ObjectId) -> DVec2 {
@@ -400,7 +414,9 @@ impl World {
                 (Presence::Held, _) => false,
                 _ => return None,
             },
-            other if self.visible.contains(other) => self.facts.contains(&literal.to_string()),
+            other if !literal.arguments.is_empty() && self.visible.contains(other) => {
+                self.facts.contains(&literal.to_string())
+            }
             _ => return None,
         })
     }

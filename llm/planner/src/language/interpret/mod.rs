@@ -8,13 +8,13 @@ mod reference;
 use super::{
     ParseError,
     role::Role,
-    syntax::{Clause, Guard, Modifier, Order, Sentence},
+    syntax::{Clause, Guard, Modifier, NounPhrase, Order, Sentence},
 };
 use crate::{
     lexicon::{FrameGoal, Lexicon, ModifierKind},
     task::{
-        Condition, Destination, Goal, Manner, MannerKind, ObjectReference, Ordering, ReferenceIndex, Span, Subtask,
-        Task, Times,
+        Condition, Destination, Direction, Goal, Manner, MannerKind, ObjectReference, Ordering, Rank, ReferenceIndex,
+        Span, Subtask, Task, Times,
     },
 };
 use acm_concept::template::TemplateLibrary;
@@ -185,7 +185,10 @@ impl Interpretation<'_> {
             ModifierKind::OneAtATime => MannerKind::OneAtATime,
             ModifierKind::OneToAPlace => MannerKind::OneToAPlace,
             ModifierKind::Aside => match &modifier.thing {
-                Some(thing) => MannerKind::Aside(self.reference(thing, &Role::Mentioned)?),
+                Some(thing) => {
+                    let thing = self.third_of(thing);
+                    MannerKind::Aside(self.reference(&thing, &Role::Mentioned)?)
+                }
                 None => return Ok(()),
             },
             ModifierKind::TakesHeading => return self.take_heading(modifier.span),
@@ -193,6 +196,17 @@ impl Interpretation<'_> {
         };
         self.manners.push(Manner { span: modifier.span, kind });
         Ok(())
+    }
+
+    /// "By way of the third tray", after "the two trays": the one that is left, wherever it stands in the row.
+    fn third_of(&self, thing: &NounPhrase) -> NounPhrase {
+        let named = |known: &ObjectReference| several(known) && known.noun == thing.noun;
+        match thing.rank {
+            Some(Rank::FromSide(number, Direction::Left)) if number > 1 && self.references.iter().any(named) => {
+                NounPhrase { rank: None, free: true, ..thing.clone() }
+            }
+            _ => thing.clone(),
+        }
     }
 
     /// An exchange of headings too.
