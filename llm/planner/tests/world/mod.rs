@@ -186,7 +186,13 @@ impl World {
         self.add("box", &[("length", edge), ("width", edge), ("height", edge)], at, color, on)
     }
     pub fn cover(&mut self, at: DVec2) -> ObjectId {
-        self.add("cover", &[("length", 0.1), ("width", 0.1), ("height", 0.09)], at, GREY, None)
+        self.add(
+            "cover",
+            &[("length", 0.1), ("width", 0.1), ("height", 0.09), ("grip", 0.02), ("rise", 0.02)],
+            at,
+            GREY,
+            None,
+        )
     }
     pub fn cell(&mut self, at: DVec2) -> ObjectId {
         self.add("cell", &[("length", 0.06), ("width", 0.03), ("height", 0.03)], at, BLUE, None)
