@@ -30,7 +30,8 @@ pub(crate) fn merge(draft: &mut Draft<'_>, kept: ObjectId, gone: ObjectId) -> Re
             let mut new = old.clone();
             new.entry.support = new.entry.support.map(|id| if id == gone { kept } else { id });
             new.entry.ambiguous_with.retain(|(id, _)| *id != gone);
-            (before.objects.push(old), after.objects.push(new));
+            before.objects.push(old);
+            after.objects.push(new);
         }
     }
     reattribute(&draft.state, |_| true, (gone, kept), &mut before, &mut after);
