@@ -58,7 +58,7 @@ impl<'a> Grounder<'a> {
             [] => return Err(self.none_fits(reference, &retrieval)),
             [only] => (only.id, format!("{}: nothing else fits", only.id), false),
             several if reference.quantity == Quantity::AnyOne => {
-                let chosen = self.any_one(reference, several);
+                let chosen = self.any_one(index, reference, several);
                 (chosen, format!("{chosen}: any one will do"), false)
             }
             several => {
@@ -296,7 +296,12 @@ impl<'a> Grounder<'a> {
     }
 
     /// Any one: the one already worked on, or else the first that is there.
-    fn any_one(&self, reference: &ObjectReference, several: &[&ObjectEntry]) -> ObjectId {
+    fn any_one(&self, index: ReferenceIndex, reference: &ObjectReference, several: &[&ObjectEntry]) -> ObjectId {
+        // Of two that change places the other one is worked on too: which is which must not turn on it.
+        let exchanged = |goal: &Goal| matches!(goal, Goal::At { object, destination: Destination::Exchanged { .. } } if *object == index);
+        if let (Some(first), true) = (several.first(), self.task.subtasks.iter().any(|s| exchanged(&s.goal))) {
+            return first.id;
+        }
         let worked_on = |entry: &&&ObjectEntry| {
             let own =
                 |t: &acm_memory::entry::Transition| t.subtask == Some(reference.subtask) && t.object() == entry.id;
