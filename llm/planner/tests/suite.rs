@@ -9,7 +9,7 @@ use acm_planner::{Decision, Planner, Task};
 use glam::DVec2;
 use rand::{Rng, seq::SliceRandom};
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
-use std::{collections::BTreeSet, f64::consts::PI, fs, sync::OnceLock};
+use std::{collections::BTreeSet, f64::consts::PI, sync::OnceLock};
 use world::{BLUE, GREEN, RED, World, options};
 
 /// Starts that are drawn for each task.
@@ -20,15 +20,10 @@ fn library() -> &'static TemplateLibrary {
     LIBRARY.get_or_init(|| acm_memory::library_of(&acm_memory::library_groups()).unwrap())
 }
 
-/// The instruction of a scenario and its paraphrases.
-fn wordings(scenario: &str) -> Vec<String> {
-    let file = format!("{}/../../sim/scenarios/rmbench/{scenario}.toml", env!("CARGO_MANIFEST_DIR"));
-    let text = fs::read_to_string(&file).unwrap_or_else(|error| panic!("{file}: {error}"));
-    let scenario: toml::Table = toml::from_str(&text).unwrap();
-    let task = scenario["task"].as_table().unwrap();
-    let string = |value: &toml::Value| value.as_str().unwrap().to_owned();
-    let paraphrases = task["paraphrases"].as_array().unwrap().iter().map(string);
-    std::iter::once(string(&task["instruction"])).chain(paraphrases).collect()
+/// The instruction of a task and its paraphrases.
+fn wordings(task: &str) -> Vec<String> {
+    let all: toml::Table = toml::from_str(include_str!("wordings.toml")).unwrap();
+    all[task].as_array().unwrap().iter().map(|wording| wording.as_str().unwrap().to_owned()).collect()
 }
 
 fn read(text: &str) -> Task {
