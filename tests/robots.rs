@@ -138,7 +138,7 @@ fn part(pose: Pose) -> GroundedPart {
         pose,
         affordances: vec![],
         functions: vec![],
-        appearance: Appearance { mean: Lab { l: 50.0, a: 0.0, b: 0.0 }, spread: 2.0 },
+        appearance: Appearance::plain(Lab { l: 50.0, a: 0.0, b: 0.0 }, 2.0),
     }
 }
 

@@ -39,6 +39,7 @@ fn positive(reader: &Reader<'_>, literal: &Literal) -> Belief {
         ("visible", Some(object), [_]) => reader.with(object, |entry| reader.visible(entry)),
         ("moved", Some(object), [_]) => reader.with(object, |entry| reader.moved(entry)),
         ("pressed", Some(_), [_]) => reader.felt(literal),
+        ("changed", Some(object), [_]) => reader.with(object, |entry| reader.changed(entry, literal)),
         ("at", Some(object), [_, Term::Place(place)]) => reader.with(object, |entry| reader.at(entry, place)),
         ("on", Some(object), [_, under]) => match object_of(under) {
             Some(under) => reader.with(object, |entry| reader.with(under, |below| reader.on(entry, below))),
@@ -302,6 +303,21 @@ impl Reader<'_> {
         let has = entry.parts.iter().any(|part| part.affordances.iter().any(|affordance| affordance == word));
         let reason = format!("a part of {} is {}{word}", entry.id, if has { "" } else { "not " });
         say(if has { Truth::Yes } else { Truth::No }, entry.confidence, seen(entry), reason)
+    }
+
+    /// Whether a thing shows something else than at first: as it was read since the last own action, which may have
+    /// changed it.
+    fn changed(&self, entry: &ObjectEntry, literal: &Literal) -> Belief {
+        let shown = self.state.tracks.get(&entry.id).map(|track| track.shown.as_slice()).unwrap_or_default();
+        let read = shown.iter().map(|known| known.last).max();
+        let acted = self.state.transitions.last().map(|transition| transition.moment);
+        match read {
+            None => Belief::unknown(format!("I have read nothing on {} in this episode", entry.id)),
+            Some(read) if acted.is_some_and(|acted| acted > read) => {
+                Belief::unknown(format!("I have not read {} since I last acted", entry.id))
+            }
+            Some(_) => self.state_literal(entry, literal),
+        }
     }
 
     fn state_literal(&self, entry: &ObjectEntry, literal: &Literal) -> Belief {

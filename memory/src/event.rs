@@ -133,6 +133,9 @@ pub struct Track {
     /// What was read on it of late.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub shown: Vec<crate::shown::Shown>,
+    /// Its colour at first and now.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub colored: Option<crate::shown::Colored>,
 }
 
 /// The spot at which an object came to stand.
@@ -142,6 +145,13 @@ pub struct Anchor {
     pub position: glam::DVec3,
     /// How many views it is the mean of.
     pub views: u32,
+}
+
+impl Track {
+    /// What is known of a thing that stands somewhere else now: what it shows goes with it.
+    pub(crate) fn moved(&mut self) -> Track {
+        Track { shown: std::mem::take(&mut self.shown), colored: self.colored, ..Track::default() }
+    }
 }
 
 impl Anchor {

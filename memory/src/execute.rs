@@ -109,8 +109,7 @@ fn apply_report(draft: &Draft<'_>, stage: &mut Stage, report: &SkillReport, id: 
         spread(&mut staged.entry, HAND_SIGMA_M);
         staged.entry.presence = Presence::Present;
         staged.entry.verified = false;
-        let shown = std::mem::take(&mut staged.track.shown);
-        staged.track = crate::event::Track { unconfirmed: Some(id), shown, ..Default::default() };
+        staged.track = crate::event::Track { unconfirmed: Some(id), ..staged.track.moved() };
         staged.placed = moved.then_some(PlaceCause::Own(id));
     }
     if let Some(held) = held_now
@@ -120,8 +119,7 @@ fn apply_report(draft: &Draft<'_>, stage: &mut Stage, report: &SkillReport, id: 
         staged.entry.presence = Presence::Held;
         staged.entry.support = None;
         let grip = report.held.filter(|(id, pose)| *id == held && pose.is_valid()).map(|(_, pose)| pose);
-        let shown = std::mem::take(&mut staged.track.shown);
-        staged.track = crate::event::Track { grip: grip.or(staged.track.grip), shown, ..Default::default() };
+        staged.track = crate::event::Track { grip: grip.or(staged.track.grip), ..staged.track.moved() };
     } else if report.failure.is_some()
         && report.left_at.is_none()
         && let Some(staged) = stage.touch(state, target)

@@ -155,7 +155,8 @@ pub(crate) fn fuse_appearance(known: &Appearance, seen: &Appearance, views: u32)
     let mix = |a: f64, b: f64| a + share * (b - a);
     let mean =
         Lab { l: mix(known.mean.l, seen.mean.l), a: mix(known.mean.a, seen.mean.a), b: mix(known.mean.b, seen.mean.b) };
-    Appearance { mean, spread: mix(known.spread, seen.spread) }
+    let palette = known.palette.towards(&seen.palette, share);
+    Appearance { mean, spread: mix(known.spread, seen.spread), palette }
 }
 
 /// The running mean of noun probabilities over views, best first.

@@ -432,20 +432,24 @@ fn settle_place(staged: &mut Staged, parts: Vec<GroundedPart>, cause: Option<Pla
     staged.entry.parts = parts;
     staged.entry.presence = Presence::Present;
     staged.placed = cause;
-    let (doubt, shown) = (staged.track.doubt.take(), std::mem::take(&mut staged.track.shown));
+    let doubt = staged.track.doubt.take();
     let anchor = position.map(|position| Anchor::seen_at(anchor, position));
-    staged.track = Track { anchor, doubt, shown, ..Track::default() };
+    staged.track = Track { anchor, doubt, ..staged.track.moved() };
 }
 
 /// What every accepted view adds, wherever it shows the object.
 fn remember_view(staged: &mut Staged, percept: &Percept<'_>, moment: Moment, eye: DVec3) {
     let (object, entry) = (percept.object, &mut staged.entry);
-    shown::add(&mut staged.track.shown, &object.readings, eye);
-    if !object.readings.is_empty() {
-        entry.state.retain(|literal| !shown::PREDICATES.contains(&literal.predicate.as_str()));
-        entry.state.extend(shown::literals(entry.id, &staged.track.shown));
+    shown::add(&mut staged.track.shown, &object.readings, eye, moment);
+    let whole = !object.truncated && entry.presence != Presence::Held;
+    if whole {
+        staged.track.colored = shown::Colored::after(staged.track.colored, &object.appearance);
     }
-    if !object.truncated && entry.presence != Presence::Held {
+    if whole || !object.readings.is_empty() {
+        entry.state.retain(|literal| !shown::tells(literal));
+        entry.state.extend(shown::literals(entry.id, &staged.track.shown, staged.track.colored.as_ref()));
+    }
+    if whole {
         entry.appearance = fusion::fuse_appearance(&entry.appearance, &object.appearance, entry.views);
         entry.categories = fusion::fuse_categories(&entry.categories, &object.categories, entry.views);
         if let Some((best, _)) = entry.categories.first() {

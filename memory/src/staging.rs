@@ -51,7 +51,7 @@ impl Thing {
         };
         let owned = |words: &[&str]| words.iter().map(|word| word.to_string()).collect();
         let share = 1.0 / nouns.len().max(1) as f64;
-        let appearance = Appearance { mean: Lab::from_srgb([128, 128, 128]), spread: 3.0 };
+        let appearance = Appearance::plain(Lab::from_srgb([128, 128, 128]), 3.0);
         let pose = PoseEstimate { pose: Pose::IDENTITY, position_sigma_m: DVec3::splat(SIGMA_M), yaw_sigma_rad: 0.03 };
         let part = GroundedPart {
             name: acm_concept::template::WHOLE.into(),
@@ -178,7 +178,7 @@ fn header(frame: u64, seconds: f64) -> FrameHeader {
 
 /// The table under all staged things: z = 0.
 pub fn table() -> SupportPlane {
-    let appearance = Appearance { mean: Lab::from_srgb([230, 230, 230]), spread: 2.0 };
+    let appearance = Appearance::plain(Lab::from_srgb([230, 230, 230]), 2.0);
     SupportPlane { normal: DVec3::Z, offset_m: 0.0, residual_m: 0.001, appearance }
 }
 

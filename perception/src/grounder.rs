@@ -16,6 +16,7 @@ use crate::{
     expected::{self, Remembered},
     fit::{Base, Evidence},
     frozen::LastPictures,
+    gather,
     hypotheses::{self, Context, Hypothesis, Measured},
     own, patches, reading,
     scan::Scan,
@@ -199,6 +200,7 @@ impl Grounder {
             let context = context(remembered.at(&pixels, SeenBy::Depth));
             let base = bodies.base_under(&plan, lowest_m, &evidence);
             let mut ranked = rank_on(context, &plan, &evidence, base);
+            gather::drop_empty(scene, &mut ranked);
             aid.advise(scene, context, &evidence, &pixels, &mut ranked);
             if let Some(object) = assemble::object(scene, context, &ranked, &evidence, &pixels, 1.0) {
                 bodies.add(&ranked);

@@ -52,7 +52,7 @@ pub(crate) struct Context<'a> {
 
 impl Context<'_> {
     /// Whether a template is tried: one on call only where the instruction names such a thing or memory knows one.
-    fn tries(&self, template: &Template) -> bool {
+    pub fn tries(&self, template: &Template) -> bool {
         let named = || template.synopsis.nouns.iter().any(|noun| self.nouns.contains(&noun.noun));
         let known = || {
             let expected = self.remembered.iter().map(|known| known.part);

@@ -60,6 +60,13 @@ impl Piece {
         let (top_m, lowest_m) = (evidence.top_m(), scene.lowest_m(&pixels));
         (!evidence.points.is_empty()).then_some(Piece { label, pixels, evidence, top_m, lowest_m })
     }
+    pub fn evidence(&self) -> &Evidence {
+        &self.evidence
+    }
+    /// What may explain it by itself, the most probable first.
+    pub fn fits<'a>(&self, context: Context<'a>) -> Vec<Hypothesis<'a>> {
+        fits(context, &self.evidence, self.lowest_m)
+    }
     /// Least distance between some surface points of either, metres.
     fn distance_m(&self, other: &Piece) -> f64 {
         let some = |piece: &Piece| -> Vec<glam::DVec3> {
@@ -353,11 +360,15 @@ fn union(scene: &Scene, segments: &Segments, a: &Piece, b: &Piece, hollow: bool)
 }
 
 fn fit<'a>(context: Context<'a>, evidence: &Evidence, base_m: f64) -> Option<Hypothesis<'a>> {
+    fits(context, evidence, base_m).into_iter().next()
+}
+
+fn fits<'a>(context: Context<'a>, evidence: &Evidence, base_m: f64) -> Vec<Hypothesis<'a>> {
     let base_m = if base_m > HOVERING_M { base_m } else { 0.0 };
     let plan: Vec<DVec2> = evidence.points.iter().map(|p| p.position.truncate()).collect();
     let height_m = evidence.top_m() - base_m;
     let measured = Measured { plan, height_m, base: Base::At(base_m), seen_by: SeenBy::Depth };
-    hypotheses::rank(context, &measured, evidence).into_iter().next()
+    hypotheses::rank(context, &measured, evidence)
 }
 
 fn outside_m(solids: &[PlacedSolid], point: glam::DVec3) -> f64 {

@@ -37,6 +37,7 @@ pub mod tools;
 mod expected;
 mod fit;
 mod frozen;
+mod gather;
 mod grid;
 mod hypotheses;
 mod joins;
@@ -50,6 +51,7 @@ mod scan;
 mod scene;
 mod segments;
 mod support;
+mod surface_tint;
 
 pub use config::GrounderConfig;
 pub use frozen::LastPictures;

@@ -3,13 +3,15 @@
 use crate::{config::GrounderConfig, grid::Grid};
 use acm_concept::{
     camera::{Intrinsics, MAX_PIXELS, RgbdFrame},
-    color::{Appearance, Lab},
+    color::{Appearance, Lab, Palette},
     object::Blindness,
 };
 use glam::DVec3;
 use rayon::prelude::*;
 use std::sync::OnceLock;
 
+/// So many pixels of a segment make its palette.
+const PALETTE_SAMPLES: usize = 1500;
 /// An image with fewer bright pixels is black. A white one must be whiter still: a bright table may nearly fill it.
 const FEW_BRIGHT: f64 = 0.05;
 const FEW_COLORED: f64 = 0.01;
@@ -113,7 +115,15 @@ impl Scan {
             self.lab[pixel].iter().zip(mean).map(|(value, m)| (f64::from(*value) - m).powi(2)).sum()
         };
         let variance = pixels.iter().map(distance2).sum::<f64>() / count;
-        Appearance { mean: Lab { l: mean[0], a: mean[1], b: mean[2] }, spread: variance.sqrt() }
+        let mut palette = Palette::default();
+        let color = |&pixel: &usize| {
+            let [l, a, b] = self.lab[pixel].map(f64::from);
+            Lab { l, a, b }
+        };
+        let step = (pixels.len() / PALETTE_SAMPLES).max(1);
+        pixels.iter().step_by(step).for_each(|pixel| palette.add(&color(pixel), 1.0));
+        let mean = Lab { l: mean[0], a: mean[1], b: mean[2] };
+        Appearance { mean, spread: variance.sqrt(), palette: palette.normalised() }
     }
 }
 

@@ -1,8 +1,9 @@
 //! The frame seen from its support: points, heights and normals in a frame whose z = 0 is the plane.
 
-use crate::{config::GrounderConfig, grid::Grid, scan::Scan, support::Plane};
+use crate::{config::GrounderConfig, grid::Grid, scan::Scan, support::Plane, surface_tint::SurfaceTint};
 use acm_concept::pose::Pose;
 use glam::{DQuat, DVec2, DVec3, Vec3};
+use std::sync::OnceLock;
 
 /// No thing has fewer pixels, however small the image.
 const FEW_PX: usize = 40;
@@ -32,6 +33,7 @@ pub(crate) struct Scene<'a> {
     pub rising: Vec<bool>,
     /// Outline of the surface, counter-clockwise, support frame x and y.
     pub outline: Vec<DVec2>,
+    tint: OnceLock<Option<SurfaceTint>>,
 }
 
 impl<'a> Scene<'a> {
@@ -61,12 +63,21 @@ impl<'a> Scene<'a> {
             in_plane: Vec::new(),
             rising: Vec::new(),
             outline: Vec::new(),
+            tint: OnceLock::new(),
         };
         scene.find_surface();
         scene.find_rising();
         scene
     }
 
+    /// The colour of the bare surface; `None` where none is seen.
+    pub fn tint(&self) -> Option<&SurfaceTint> {
+        self.tint.get_or_init(|| SurfaceTint::measure(self)).as_ref()
+    }
+    /// Whether a pixel has another colour than the bare surface would have there.
+    pub fn is_unlike_surface(&self, pixel: usize) -> bool {
+        self.tint().is_some_and(|tint| tint.is_unlike(self, pixel))
+    }
     /// Height above which a pixel stands on the plane rather than in it. The share of the distance stands for the
     /// ripples of a structured-light or stereo camera, which no smoothing removes.
     pub fn height_limit_m(&self, pixel: usize) -> f32 {

@@ -36,6 +36,16 @@ impl Segments {
         self.count += 1;
         label
     }
+    /// Drops segments of fewer pixels than `least`; the others, and those in `kept`, keep their labels.
+    pub fn drop_specks(&mut self, least: usize, kept: &std::ops::Range<u32>) {
+        let mut sizes = vec![0; self.count];
+        self.labels.iter().filter(|label| **label != NONE).for_each(|label| sizes[*label as usize] += 1);
+        for label in self.labels.iter_mut().filter(|label| **label != NONE && !kept.contains(label)) {
+            if sizes[*label as usize] < least {
+                *label = NONE;
+            }
+        }
+    }
     /// Keeps the given segments and numbers them anew.
     pub fn keep(&mut self, kept: &[bool]) {
         let mut names = vec![NONE; self.count];

@@ -45,7 +45,7 @@ fn began() -> Moment {
 impl Scene {
     /// An empty one.
     pub fn new(library: TemplateLibrary) -> Scene {
-        let appearance = Appearance { mean: Lab::from_srgb([180, 170, 150]), spread: 3.0 };
+        let appearance = Appearance::plain(Lab::from_srgb([180, 170, 150]), 3.0);
         let support = SupportPlane { normal: DVec3::Z, offset_m: 0.0, residual_m: 0.001, appearance };
         let progress = TaskProgress { done: Vec::new(), instructed: began() };
         Scene { library, objects: Vec::new(), progress, support }
@@ -96,7 +96,7 @@ impl Scene {
 
     fn part(&self, thing: &Thing<'_>, name: &str) -> Option<GroundedPart> {
         let template: &Template = self.library.get(thing.template)?;
-        let appearance = Appearance { mean: thing.color, spread: 2.0 };
+        let appearance = Appearance::plain(thing.color, 2.0);
         let parameter = |(name, value): (&str, f64)| ParameterEstimate {
             name: name.into(),
             value,

@@ -124,7 +124,7 @@ fn part(base: Pose) -> GroundedPart {
         pose: PoseEstimate { pose: base, position_sigma_m: DVec3::splat(0.001), yaw_sigma_rad: 0.01 },
         affordances: Vec::new(),
         functions: Vec::new(),
-        appearance: Appearance { mean: Lab { l: 50.0, a: 0.0, b: 0.0 }, spread: 2.0 },
+        appearance: Appearance::plain(Lab { l: 50.0, a: 0.0, b: 0.0 }, 2.0),
     }
 }
 

@@ -51,11 +51,78 @@ impl Lab {
     }
 }
 
-/// What a segment looks like: mean colour and the standard deviation around it.
+/// Hues that a palette tells apart, from 0 radians on in equal steps, and greys, from dark to light.
+const HUES: usize = 8;
+const GREYS: [f64; 3] = [18.0, 52.0, 86.0];
+/// Chroma below which a colour is a grey, and from which on it has a hue; between the two it is some of either.
+const GREY_CHROMA: f64 = 9.0;
+const HUE_CHROMA: f64 = 19.0;
+
+/// Which share of a surface has which colour: eight hues, then dark, middle and light grey. A colour between two of them
+/// counts for either, so that what is seen in another light changes a little and never jumps. Sums to 1, or to 0 where
+/// nothing is known.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Palette([f64; HUES + GREYS.len()]);
+
+impl Palette {
+    /// Adds one colour with a weight.
+    pub fn add(&mut self, color: &Lab, weight: f64) {
+        let vivid = ((color.chroma() - GREY_CHROMA) / (HUE_CHROMA - GREY_CHROMA)).clamp(0.0, 1.0);
+        let turn = color.hue().rem_euclid(std::f64::consts::TAU) / std::f64::consts::TAU * HUES as f64;
+        let (hue, between) = (turn.floor() as usize % HUES, turn.fract());
+        let mut give = |slot: usize, share: f64| self.0[slot] += weight * share;
+        give(hue, vivid * (1.0 - between));
+        give((hue + 1) % HUES, vivid * between);
+        let lightness = color.l.clamp(GREYS[0], GREYS[2]);
+        let low = usize::from(lightness >= GREYS[1]);
+        let between = (lightness - GREYS[low]) / (GREYS[low + 1] - GREYS[low]);
+        give(HUES + low, (1.0 - vivid) * (1.0 - between));
+        give(HUES + low + 1, (1.0 - vivid) * between);
+    }
+    /// The same shares with the sum 1.
+    pub fn normalised(self) -> Palette {
+        let sum: f64 = self.0.iter().sum();
+        if sum > 0.0 { Palette(self.0.map(|share| share / sum)) } else { self }
+    }
+    /// Between this palette and another one: `share` of the way.
+    pub fn towards(&self, other: &Palette, share: f64) -> Palette {
+        if self.is_unknown() {
+            return *other;
+        }
+        let mut mixed = self.0;
+        mixed.iter_mut().zip(other.0).for_each(|(own, other)| *own += share * (other - *own));
+        Palette(mixed)
+    }
+    /// Whether nothing is known.
+    pub fn is_unknown(&self) -> bool {
+        self.0.iter().all(|share| *share == 0.0)
+    }
+    /// How unlike two palettes are, 0 for equal ones to 1 for ones without a common colour: the symmetric chi-square
+    /// distance, in which a small share of a colour that the other lacks counts more than the same difference of a large one.
+    pub fn distance(&self, other: &Palette) -> f64 {
+        let terms = self.0.iter().zip(other.0).filter(|(a, b)| *a + b > 0.0);
+        0.5 * terms.map(|(a, b)| (a - b).powi(2) / (a + b)).sum::<f64>()
+    }
+}
+
+/// What a segment looks like: mean colour, the standard deviation around it, and the colours in it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Appearance {
     /// Mean colour.
     pub mean: Lab,
     /// Root mean square distance of the pixels from the mean, in delta E.
     pub spread: f64,
+    /// The shares of colours; of one where nothing is said of it.
+    #[serde(default, skip_serializing_if = "Palette::is_unknown")]
+    pub palette: Palette,
+}
+
+impl Appearance {
+    /// Of a surface that has one colour, but for a spread.
+    pub fn plain(mean: Lab, spread: f64) -> Appearance {
+        let mut palette = Palette::default();
+        palette.add(&mean, 1.0);
+        Appearance { mean, spread, palette }
+    }
 }

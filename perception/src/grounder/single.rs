@@ -4,6 +4,7 @@ use super::{Grounder, assemble, bases::Bodies, beliefs, explained::Explained, ra
 use crate::{
     expected::Remembered,
     fit::Evidence,
+    gather,
     hypotheses::Context,
     joins, parting,
     scene::Scene,
@@ -129,6 +130,7 @@ impl Grounder {
             let known = first..segments.count as u32;
             // What is hollow or cut in two is told by upright solids alone: they are many, and most are refused.
             let upright = Context { lying: false, displaced: &[], ..unremembered };
+            gather::gather(scene, &mut segments, upright, &known);
             joins::join(scene, &mut segments, upright, known.clone());
             parting::part(scene, &mut segments, upright, known);
             let pixels = segments.pixels();

@@ -14,7 +14,9 @@ use glam::{DQuat, DVec3};
 
 const CYLINDER: &str = include_str!("../../../memory/library/cylinder.toml");
 
-const GREY: Appearance = Appearance { mean: Lab { l: 50.0, a: 0.0, b: 0.0 }, spread: 1.0 };
+fn grey() -> Appearance {
+    Appearance::plain(Lab { l: 50.0, a: 0.0, b: 0.0 }, 1.0)
+}
 
 /// A can before a camera that looks down on it, in a white picture of the given width.
 fn picture(width: u32) -> (RgbImage, [i64; 2], [i64; 2]) {
@@ -37,7 +39,7 @@ fn picture(width: u32) -> (RgbImage, [i64; 2], [i64; 2]) {
         pose: PoseEstimate { pose: Pose::IDENTITY, position_sigma_m: DVec3::ZERO, yaw_sigma_rad: 0.0 },
         affordances: Vec::new(),
         functions: Vec::new(),
-        appearance: GREY,
+        appearance: grey(),
     };
     let mut mask = vec![false; pixels];
     mask[pixels / 2 + width as usize / 2] = true;
@@ -45,7 +47,7 @@ fn picture(width: u32) -> (RgbImage, [i64; 2], [i64; 2]) {
         category: "can".into(),
         categories: Vec::new(),
         parts: vec![part],
-        appearance: GREY,
+        appearance: grey(),
         support: PixelSupport::from_mask(&mask, width as usize).unwrap(),
         confidence: 1.0,
         truncated: false,

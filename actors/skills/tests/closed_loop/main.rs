@@ -27,7 +27,7 @@ const MAX_TICKS: usize = 2000;
 
 fn part(pose: Pose) -> GroundedPart {
     let pose = PoseEstimate { pose, position_sigma_m: DVec3::splat(0.005), yaw_sigma_rad: 0.05 };
-    let appearance = Appearance { mean: Lab { l: 50.0, a: 0.0, b: 0.0 }, spread: 2.0 };
+    let appearance = Appearance::plain(Lab { l: 50.0, a: 0.0, b: 0.0 }, 2.0);
     let (template, none) = ("box".into(), Vec::new());
     GroundedPart {
         template,

@@ -91,7 +91,7 @@ impl Case {
             observability: Observability::Observed,
         };
         let parameters: Vec<ParameterEstimate> = named.iter().map(estimate).collect();
-        let grey = Appearance { mean: Lab::from_srgb([128; 3]), spread: 0.0 };
+        let grey = Appearance::plain(Lab::from_srgb([128; 3]), 0.0);
         let part = |(spec, frame): (&acm_concept::template::PartSpec, Pose)| GroundedPart {
             template: template.name.clone(),
             name: spec.name.clone(),

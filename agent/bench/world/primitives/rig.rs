@@ -185,7 +185,7 @@ pub fn part(pose: Pose) -> GroundedPart {
         pose: PoseEstimate { pose, position_sigma_m: DVec3::splat(0.001), yaw_sigma_rad: 0.01 },
         affordances: vec![],
         functions: vec![],
-        appearance: Appearance { mean: Lab { l: 50.0, a: 0.0, b: 0.0 }, spread: 2.0 },
+        appearance: Appearance::plain(Lab { l: 50.0, a: 0.0, b: 0.0 }, 2.0),
     }
 }
 

@@ -1,19 +1,29 @@
 //! What a description says beside noun, colour and place: states, contents, twins, and what was done with a thing.
 
-use super::{Grounder, Stuck, history::place_at};
+use super::{Grounder, Stuck, geometry::Extent, history::place_at};
 use crate::task::{Handled, ObjectReference};
 use acm_concept::{
     ids::ObjectId,
     literal::{Literal, Term, Truth},
+    object::Observability,
 };
-use acm_memory::entry::{Moment, ObjectEntry, TransitionResult};
+use acm_memory::{
+    MemoryView,
+    entry::{Moment, ObjectEntry, TransitionResult},
+};
+use glam::DVec2;
+use std::f64::consts::FRAC_PI_2;
 
-/// Surfaces within this delta E (CIE76) look alike.
-const TWIN_COLOR: f64 = 18.0;
-/// Lengths within this ratio look alike.
-const TWIN_LENGTH: f64 = 1.25;
-/// What is less alike than another by this much, in the measure of [`unlikeness`], is not meant.
-const TWIN_MARGIN: f64 = 0.3;
+/// How far apart the palettes of one thing in two places and lights usually are, in the measure of [`acm_concept::color::Palette::distance`].
+const TWIN_PALETTE: f64 = 0.10;
+/// How far a length of one thing that was seen whole twice usually is off, as a logarithm of the ratio; and where some of it
+/// was cut off or hidden.
+const TWIN_LENGTH: f64 = 0.10;
+const TWIN_LENGTH_UNSEEN: f64 = 0.30;
+/// What is more unlike than this is no twin, in the measure of [`unlikeness`].
+const NO_TWIN: f64 = 12.0;
+/// What is less alike than another by this much is not meant.
+const TWIN_MARGIN: f64 = 1.0;
 
 impl<'a> Grounder<'a> {
     /// Keeps those that fit what else the description says.
@@ -27,7 +37,9 @@ impl<'a> Grounder<'a> {
         if let Some(model) = reference.twin_of {
             let model = self.object_at(model, depth + 1)?.value;
             if let Some(model) = self.view.object(model) {
-                let unlike = |entry: &ObjectEntry| unlikeness(entry, model).filter(|_| entry.id != model.id);
+                let unlike = |entry: &ObjectEntry| {
+                    unlikeness(self.view, entry, model).filter(|much| *much < NO_TWIN && entry.id != model.id)
+                };
                 let least = contenders.iter().filter_map(|entry| unlike(entry)).fold(f64::INFINITY, f64::min);
                 contenders.retain(|entry| unlike(entry).is_some_and(|much| much <= least + TWIN_MARGIN));
             }
@@ -74,24 +86,27 @@ impl<'a> Grounder<'a> {
     }
 }
 
-/// How much two things of one make differ: the largest difference, of colour or of a parameter, over what still looks alike.
-/// `None` for things of different makes, or that differ by more.
-fn unlikeness(entry: &ObjectEntry, model: &ObjectEntry) -> Option<f64> {
-    if entry.parts.len() != model.parts.len() {
-        return None;
-    }
-    let mut most = entry.appearance.mean.distance(&model.appearance.mean) / TWIN_COLOR;
-    for (part, like) in entry.parts.iter().zip(&model.parts) {
-        if part.template != like.template {
-            return None;
-        }
-        for parameter in &part.parameters {
-            let other = like.value(&parameter.name)?;
-            let (low, high) = (parameter.value.abs().min(other.abs()), parameter.value.abs().max(other.abs()));
-            if high > 0.0 {
-                most = most.max((high / low.max(f64::MIN_POSITIVE)).ln() / TWIN_LENGTH.ln());
-            }
-        }
-    }
-    (most <= 1.0).then_some(most)
+/// How much two things differ to the eye: half the sum of the squares of what is unlike, each in the measure of what is usual
+/// between two views of one thing: the negative logarithm of the likelihood that they are of one make, but for a constant. What
+/// template explains them does not count, as a thing that no template was made for may be taken for one or another.
+/// `None` without solids.
+fn unlikeness(view: &dyn MemoryView, entry: &ObjectEntry, model: &ObjectEntry) -> Option<f64> {
+    let palettes = entry.appearance.palette.distance(&model.appearance.palette) / TWIN_PALETTE;
+    let whole = [entry, model].iter().all(|entry| {
+        let parameters = entry.parts.iter().flat_map(|part| &part.parameters);
+        parameters.into_iter().all(|parameter| parameter.observability == Observability::Observed)
+    });
+    let usual = if whole { TWIN_LENGTH } else { TWIN_LENGTH_UNSEEN };
+    let lengths = extents(view, entry)?.into_iter().zip(extents(view, model)?);
+    let lengths = lengths.map(|(a, b)| ((a / b).ln() / usual).powi(2)).sum::<f64>();
+    Some(0.5 * (palettes.powi(2) + lengths))
+}
+
+/// The longer and the shorter side seen from above and the height, metres; `None` for what has none.
+fn extents(view: &dyn MemoryView, entry: &ObjectEntry) -> Option<[f64; 3]> {
+    let extent = Extent::now(view, entry)?;
+    let yaw = entry.pose()?.yaw();
+    let [a, b] = [0.0, FRAC_PI_2].map(|turn| extent.span(DVec2::from_angle(yaw + turn)));
+    let all = [a.max(b), a.min(b), extent.high - extent.low];
+    all.iter().all(|length| *length > 0.0).then_some(all)
 }

@@ -80,7 +80,10 @@ pub(super) fn concluded(state: &State<'_>, literal: &Literal) -> Option<Belief> 
 /// What the things that show something say of the moment: `accepted` by a lamp's colour, `changed` by a needle or whatever
 /// else memory saw change. `None` where nothing shows.
 fn shown(view: &dyn MemoryView, predicate: &str) -> Option<Belief> {
-    let present = view.objects().iter().filter(|entry| entry.presence == Presence::Present);
+    // What was last seen before the last own action says nothing of what came of it.
+    let acted = view.transitions().last().map(|transition| transition.moment);
+    let fresh = |entry: &&ObjectEntry| acted.is_none_or(|acted| entry.last_seen > acted);
+    let present = view.objects().iter().filter(|entry| entry.presence == Presence::Present).filter(fresh);
     let said: Vec<(bool, String)> = match predicate {
         "accepted" => {
             present.filter_map(lamp).map(|(id, color)| (color == ASSENT, format!("{id} shows {color}"))).collect()

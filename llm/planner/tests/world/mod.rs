@@ -144,7 +144,7 @@ pub fn library() -> TemplateLibrary {
 
 impl World {
     pub fn new() -> World {
-        let appearance = Appearance { mean: Lab::from_srgb([180, 170, 150]), spread: 3.0 };
+        let appearance = Appearance::plain(Lab::from_srgb([180, 170, 150]), 3.0);
         World {
             library: library(),
             objects: Vec::new(),
@@ -212,7 +212,7 @@ impl World {
         let id = ObjectId(self.objects.len() as u64 + 1);
         let z = on.map_or(TABLE_Z, |on| self.top(on));
         let pose = Pose::from_translation(at.extend(z));
-        let appearance = Appearance { mean: Lab::from_srgb(color), spread: 2.0 };
+        let appearance = Appearance::plain(Lab::from_srgb(color), 2.0);
         let known = self.library.get(template).unwrap();
         let parameter = |(name, value): &(&str, f64)| ParameterEstimate {
             name: (*name).into(),

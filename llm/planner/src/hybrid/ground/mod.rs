@@ -67,7 +67,7 @@ impl<'a> Grounding<'a> {
             return Err(self.faults);
         };
         settle_subtasks(&subtasks, &mut references);
-        let nouns = nouns_of(&references);
+        let nouns = nouns_of(&references, self.library);
         Ok(Task { instruction: self.text.into(), subtasks, references, untouched: form.untouched, nouns, manners })
     }
 

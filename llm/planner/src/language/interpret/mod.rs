@@ -17,7 +17,7 @@ use crate::{
         Span, Subtask, Task, Times,
     },
 };
-use acm_concept::template::TemplateLibrary;
+use acm_concept::template::{Template, TemplateLibrary};
 
 /// Joins sentences to a task.
 pub(super) fn interpret(
@@ -52,7 +52,7 @@ pub(super) fn interpret(
     let Interpretation { drafts, mut references, manners, .. } = reading;
     let subtasks = judged_together(drafts);
     settle_subtasks(&subtasks, &mut references);
-    let nouns = nouns_of(&references);
+    let nouns = nouns_of(&references, library);
     Ok(Task { instruction: text.into(), subtasks, references, untouched, nouns, manners })
 }
 
@@ -384,12 +384,27 @@ pub(crate) fn settle_subtasks(subtasks: &[Subtask], references: &mut [ObjectRefe
     }
 }
 
-/// The library's nouns that references use, each once.
-pub(crate) fn nouns_of(references: &[ObjectReference]) -> Vec<String> {
+/// A function that more than this share of the templates offers says little of what a thing is.
+const COMMON: f64 = 0.25;
+
+/// The library's nouns that references use, each once: of a thing that is only said to be good for something ("press"),
+/// those of the templates that offer it.
+pub(crate) fn nouns_of(references: &[ObjectReference], library: &TemplateLibrary) -> Vec<String> {
     let mut nouns: Vec<String> = Vec::new();
-    for noun in references.iter().filter_map(|reference| reference.noun.as_ref()) {
+    let mut add = |noun: &String| {
         if !nouns.contains(noun) {
             nouns.push(noun.clone());
+        }
+    };
+    for reference in references {
+        if let Some(noun) = &reference.noun {
+            add(noun);
+        } else if let Some(function) = &reference.function {
+            let offers = |template: &&Template| template.functions.iter().any(|offered| &offered.name == function);
+            let offering: Vec<&Template> = library.iter().filter(offers).collect();
+            if (offering.len() as f64) < COMMON * library.iter().count() as f64 {
+                offering.iter().flat_map(|template| &template.synopsis.nouns).for_each(|noun| add(&noun.noun));
+            }
         }
     }
     nouns
