@@ -30,10 +30,11 @@ const SURE: f64 = 0.5;
 const NEEDLE_STEP: f64 = 15.0;
 
 /// A thing has another colour than at first from this distance of hue and chroma on (CIELAB), which shade and another side do
-/// not reach, and shows it if it is that colourful. A mixture of colours is none.
+/// not reach, and shows it if it is that colourful. What is part bright and part dark, as a
+/// lamp on its foot, has one colour; a mixture of bright ones has none.
 const OTHER_COLOR: f64 = 30.0;
 const COLORFUL: f64 = 22.0;
-const ONE_COLOR: f64 = 25.0;
+const ONE_COLOR: f64 = 45.0;
 /// Share of a new view in the colour that a thing has now.
 const NOW: f64 = 0.7;
 

@@ -3,13 +3,18 @@
 
 use crate::{
     hypotheses::{Context, Hypothesis},
-    joins,
-    raster,
+    joins::{self, SPOKEN_OF},
+    measure, raster,
     scene::Scene,
     segments::{NONE, Segments},
     scan::Tint,
 };
-use std::ops::Range;
+use glam::DVec2;
+use std::{
+    collections::BTreeMap,
+    f64::consts::{FRAC_PI_2, PI},
+    ops::Range,
+};
 
 /// What explains a gathering explains these shares of its surface and of its outline,
 const ON_SURFACE: f64 = 0.96;
@@ -22,9 +27,19 @@ const NEAR_M: f32 = 0.008;
 /// So many of those that fit best are looked at.
 const RUNNERS_UP: usize = 3;
 
+/// What is at an end narrower than this share of the widest is taken off, in slices so thick, if so much is left.
+const THIN: f64 = 0.55;
+const SLICE_M: f64 = 0.004;
+const CORE: f64 = 0.6;
+
+/// What is darker than the surface by this much (CIELAB) does not lie in the shade.
+const DARKER: f32 = 45.0;
+
 /// Neighbouring pixels of one colour differ by less: in tint, and in lightness, which shade changes (CIELAB).
 const ALIKE: f32 = 14.0;
 const ALIKE_LIGHTNESS: f32 = 25.0;
+/// Below this lightness, and the more the darker, tints are mostly noise.
+const DARK: f32 = 25.0;
 /// A segment of which more than this share has the colour belongs to it whole, with what is drawn on it.
 const MOSTLY: f64 = 0.5;
 /// What is gathered is worth a fit if it is other than a segment that is there by more than this share of its pixels.
@@ -40,43 +55,100 @@ pub(crate) fn gather(scene: &Scene, segments: &mut Segments, context: Context, k
     let stands = |at: usize| labels[at] != NONE && !known.contains(&labels[at]);
     let level = |at: usize| scene.in_plane[at] || scene.rising[at] || !scene.is_known(at);
     let free = |at: usize| labels[at] == NONE && !scene.own[at] && level(at);
-    let colored = scene.grid.map(|at| stands(at) || free(at) && scene.is_unlike_surface(at));
+    let colored = scene.grid.map(|at| stands(at) || free(at) && is_foreign(scene, at));
     let alike = |a: usize, b: usize| {
-        let lightness = (scene.scan.lab[a][0] - scene.scan.lab[b][0]).abs();
-        scene.scan.tint(a).distance(&scene.scan.tint(b)) < ALIKE && lightness < ALIKE_LIGHTNESS
+        let [light, other] = [a, b].map(|at| scene.scan.lab[at][0]);
+        // Noise gives dark pixels any tint.
+        let tolerance = ALIKE + (DARK - light.min(other)).max(0.0);
+        scene.scan.tint(a).distance(&scene.scan.tint(b)) < tolerance && (light - other).abs() < ALIKE_LIGHTNESS
     };
     let (blobs, sizes) = scene.grid.components(&colored, alike);
     let pixels = segments.pixels();
     for (blob, _) in (0u32..).zip(&sizes).filter(|(_, size)| **size >= scene.min_segment_px()) {
-        let of_blob = |list: &[usize]| list.iter().filter(|&&at| blobs[at] == blob).count();
-        let mut gathered: Vec<usize> = Vec::new();
-        let mut largest = 0;
-        for (label, list) in (0u32..).zip(&pixels).filter(|(label, _)| !known.contains(label)) {
-            let inside = of_blob(list);
-            let whole = inside as f64 > MOSTLY * list.len() as f64;
-            largest = largest.max(if whole { list.len() } else { inside });
-            gathered.extend(list.iter().filter(|&&at| segments.labels[at] == label && (whole || blobs[at] == blob)));
-        }
-        gathered.sort_unstable();
-        let news = gathered.len() - largest.min(gathered.len());
-        if gathered.len() < scene.min_segment_px() || (news as f64) < NEWS * gathered.len() as f64 {
-            continue;
-        }
-        let mut joined =
-            Segments { labels: segments.labels.clone(), count: segments.count, inner: segments.inner.clone() };
-        let label = joined.lay(&gathered);
-        let Some(piece) = joins::Piece::measure(scene, &joined, label, gathered) else { continue };
-        let explains = |found: &Hypothesis| {
-            let (on_surface, on_outline) = found.explained(piece.evidence());
-            on_surface > ON_SURFACE && on_outline > ON_OUTLINE && empty(scene, found) < EMPTY
+        let share = |(label, list): (u32, &Vec<usize>)| {
+            let left = |at: &usize| segments.labels[*at] == label;
+            let inside: Vec<usize> = list.iter().copied().filter(|at| left(at) && blobs[*at] == blob).collect();
+            let whole = inside.len() as f64 > MOSTLY * list.len() as f64;
+            if whole { list.iter().copied().filter(left).collect() } else { inside }
         };
-        let best = piece.fits(context).into_iter().take(RUNNERS_UP).find(explains);
-        if let Some(best) = best.filter(|best| best.model.template.on_call) {
-            *segments = joined;
-            claim(scene, segments, label, known, &best);
+        let shares = (0u32..).zip(&pixels).filter(|(label, _)| !known.contains(label)).map(share);
+        let mut shares: Vec<Vec<usize>> = shares.filter(|share| !share.is_empty()).collect();
+        shares.sort_by_key(|share| share.len());
+        // All of it, or what lies before a larger thing of the same colour; then without what sticks out.
+        let least = scene.min_segment_px();
+        let (mut candidates, mut cores): (Vec<Vec<usize>>, Vec<Vec<usize>>) = Default::default();
+        for taken in [shares.len(), shares.len().saturating_sub(1)] {
+            let mut all: Vec<usize> = shares.iter().take(taken).flatten().copied().collect();
+            all.sort_unstable();
+            let largest = shares.iter().take(taken).map(Vec::len).max().unwrap_or(0);
+            let is_news = all.len() - largest >= (NEWS * all.len() as f64) as usize + 1;
+            cores.extend(core(scene, &all));
+            candidates.extend(Some(all).filter(|_| is_news));
+        }
+        candidates.append(&mut cores);
+        candidates.retain(|candidate| candidate.len() >= least);
+        candidates.dedup();
+        let explained = |pixels| explained(scene, segments, context, pixels);
+        if let Some(found) = candidates.into_iter().find_map(explained) {
+            *segments = found.segments;
+            claim(scene, segments, found.label, known, &found.best);
         }
     }
     segments.drop_specks(scene.min_segment_px(), known);
+}
+
+/// A gathering that something on call explains.
+struct Gathered<'a> {
+    segments: Segments,
+    label: u32,
+    best: Hypothesis<'a>,
+}
+
+fn explained<'a>(
+    scene: &Scene,
+    segments: &Segments,
+    context: Context<'a>,
+    pixels: Vec<usize>,
+) -> Option<Gathered<'a>> {
+    let mut segments =
+        Segments { labels: segments.labels.clone(), count: segments.count, inner: segments.inner.clone() };
+    let label = segments.lay(&pixels);
+    let piece = joins::Piece::measure(scene, &segments, label, pixels)?;
+    let explains = |found: &Hypothesis| {
+        let (on_surface, on_outline) = found.explained(piece.evidence());
+        on_surface > ON_SURFACE && on_outline > ON_OUTLINE && empty(scene, found) < EMPTY
+    };
+    let fits = piece.fits(context);
+    let least = fits.first()?.score - SPOKEN_OF;
+    let on_call = |found: &Hypothesis| found.model.template.on_call && found.score > least;
+    let best = fits.into_iter().take(RUNNERS_UP).find(|found| on_call(found) && explains(found))?;
+    Some(Gathered { segments, label, best })
+}
+
+/// What is left of some pixels without what is thin at an end, as seen from above; `None` if that is nearly all or too
+/// little.
+fn core(scene: &Scene, pixels: &[usize]) -> Option<Vec<usize>> {
+    let at = |pixel: &usize| scene.point[*pixel].truncate().as_dvec2();
+    let known: Vec<usize> = pixels.iter().copied().filter(|&pixel| scene.is_known(pixel)).collect();
+    let plan: Vec<DVec2> = known.iter().step_by(3).map(at).collect();
+    let rectangle = measure::smallest(&measure::rectangles(&plan, PI / 60.0, 0.003))?;
+    let mut core = known;
+    for turn in [0.0, FRAC_PI_2] {
+        let (along, across) = (DVec2::from_angle(rectangle.yaw + turn), DVec2::from_angle(rectangle.yaw + turn + FRAC_PI_2));
+        let slice = |pixel: &usize| (at(pixel).dot(along) / SLICE_M).floor() as i64;
+        let mut widths: BTreeMap<i64, (f64, f64)> = BTreeMap::new();
+        for pixel in &core {
+            let v = at(pixel).dot(across);
+            let width = widths.entry(slice(pixel)).or_insert((v, v));
+            *width = (width.0.min(v), width.1.max(v));
+        }
+        let widest = widths.values().map(|(low, high)| high - low).fold(0.0, f64::max);
+        let wide = |(_, (low, high)): &(&i64, &(f64, f64))| high - low > THIN * widest;
+        let (first, last) = (widths.iter().find(wide)?.0, widths.iter().rev().find(wide)?.0);
+        core.retain(|pixel| (*first..=*last).contains(&slice(pixel)));
+    }
+    let share = core.len() as f64 / pixels.len().max(1) as f64;
+    (CORE..1.0 - NEWS).contains(&share).then_some(core)
 }
 
 /// Drops the best of what may explain a segment while it is on call and partly empty, and something else is left.
@@ -84,6 +156,11 @@ pub(crate) fn drop_empty(scene: &Scene, ranked: &mut Vec<Hypothesis>) {
     while ranked.len() > 1 && ranked[0].model.template.on_call && empty(scene, &ranked[0]) > EMPTY {
         ranked.remove(0);
     }
+}
+
+/// Whether a pixel has another colour than the surface, and not for lying in the shade.
+fn is_foreign(scene: &Scene, pixel: usize) -> bool {
+    scene.tint().is_some_and(|tint| tint.is_unlike(scene, pixel) || tint.is_darker(scene, pixel, DARKER))
 }
 
 /// Share of what a hypothesis shows to the camera where there is nothing.
@@ -95,7 +172,7 @@ fn empty(scene: &Scene, found: &Hypothesis) -> f64 {
         let noise_m = scene.noise_ratio * scene.config.depth_sigma_m(seen);
         scene.is_known(pixel) && seen - depth > BEHIND_M + 3.0 * noise_m
     };
-    let bare = |pixel: usize| scene.in_plane[pixel] && !scene.is_unlike_surface(pixel);
+    let bare = |pixel: usize| scene.in_plane[pixel] && !is_foreign(scene, pixel);
     let nothing = hits.iter().filter(|&&(pixel, depth)| bare(pixel) || behind(pixel, depth)).count();
     nothing as f64 / hits.len().max(1) as f64
 }

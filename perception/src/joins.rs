@@ -31,7 +31,7 @@ const FRINGE_THICK: f64 = 0.1;
 /// Evidence (negative log likelihood) that it takes to believe that two things lie like the parts of one.
 const COINCIDENCE: f64 = 15.0;
 /// The same where the one is on call and the instruction speaks of it, and what it then explains of surface and outline.
-const SPOKEN_OF: f64 = 60.0;
+pub(crate) const SPOKEN_OF: f64 = 60.0;
 const SPOKEN_OF_SURFACE: f64 = 0.96;
 const SPOKEN_OF_OUTLINE: f64 = 0.77;
 /// Each of two things explains this share of its surface and of its outline.

@@ -47,6 +47,10 @@ impl SurfaceTint {
         tint.lightness = tint.lit(scene, &samples)?;
         Some(tint)
     }
+    /// Whether a pixel is darker than the bare surface would be there, by more than a difference of lightness.
+    pub fn is_darker(&self, scene: &Scene, pixel: usize, by: f32) -> bool {
+        self.lightness.dot(&place(scene, pixel)) - scene.scan.lab[pixel][0] > by
+    }
     fn is_bare(&self, scene: &Scene, sample: &Sample) -> bool {
         sample.tint.distance(&self.tint_at(&sample.place)) <= 0.6 * scene.config.patch_contrast
     }
