@@ -8,6 +8,9 @@ use acm_concept::{
 };
 use glam::{DVec2, DVec3};
 
+/// Affordance of what holds things within its walls.
+const CONTAINS: &str = "contains";
+
 /// Outline of an object seen from above, round its own centre.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Outline {
@@ -30,6 +33,8 @@ pub struct Body {
     pub base_m: f64,
     /// Height of its highest point, world z.
     pub top_m: f64,
+    /// Whether things lie within its walls.
+    pub contains: bool,
 }
 
 impl Body {
@@ -67,6 +72,7 @@ impl Body {
             outline: radius.map_or(Outline::Rectangle((high - low).truncate() * 0.5), Outline::Disc),
             base_m: main.translation.z + low.z,
             top_m: main.translation.z + high.z,
+            contains: parts.iter().any(|part| part.affordances.iter().any(|affordance| affordance == CONTAINS)),
         })
     }
     /// Longer side, shorter side and height, metres.

@@ -22,12 +22,26 @@ const EDGE_TOLERANCE_M: f64 = 0.005;
 const HYSTERESIS: f64 = 1.5;
 /// Outlines with a smaller gap are next to each other, metres.
 pub const NEXT_TO_M: f64 = 0.05;
+/// What lies in a thing is smaller than this share of it, seen from above, and lies on a floor so thick, metres.
+const WITHIN: f64 = 0.7;
+const FLOOR_M: f64 = 0.004;
 /// Two thinner things are told apart by their outlines, not by their heights, metres.
 const THIN_M: f64 = 0.005;
 
 /// Whether `upper` rests on `lower`: the middle of its base lies over the other's outline and at the height of
-/// its top.
+/// its top, or, in what contains things, of its floor.
 pub fn rests_on(upper: &Body, lower: &Body, tolerance: f64) -> bool {
+    let lies_in = || {
+        let floor_m = lower.base_m + FLOOR_M;
+        lower.contains
+            && upper.area() < WITHIN * lower.area()
+            && (upper.base_m - floor_m).abs() <= tolerance * REST_TOLERANCE_M
+            && lower.covers(upper.centre, 0.0)
+    };
+    stands_on(upper, lower, tolerance) || lies_in()
+}
+
+fn stands_on(upper: &Body, lower: &Body, tolerance: f64) -> bool {
     let thin = upper.height() < THIN_M && lower.height() < THIN_M;
     let above =
         if thin { lower.area() > upper.area() } else { upper.base_m + upper.top_m > lower.base_m + lower.top_m };

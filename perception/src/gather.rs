@@ -35,15 +35,20 @@ const CORE: f64 = 0.6;
 /// What is darker than the surface by this much (CIELAB) does not lie in the shade.
 const DARKER: f32 = 45.0;
 
+/// So few pieces may be as many things.
+const FEW: usize = 2;
+
 /// Neighbouring pixels of one colour differ by less: in tint, and in lightness, which shade changes (CIELAB).
 const ALIKE: f32 = 14.0;
 const ALIKE_LIGHTNESS: f32 = 25.0;
+/// Parts of one thing have tints that differ by less.
+const OTHER: f32 = 20.0;
 /// Below this lightness, and the more the darker, tints are mostly noise.
 const DARK: f32 = 25.0;
 /// A segment of which more than this share has the colour belongs to it whole, with what is drawn on it.
 const MOSTLY: f64 = 0.5;
 /// What is gathered is worth a fit if it is other than a segment that is there by more than this share of its pixels.
-const NEWS: f64 = 0.05;
+const NEWS: f64 = 0.03;
 
 /// Makes one segment of all that stands up of an area of one colour, where a thing that the instruction speaks of, and that
 /// is on call, explains it. Segments with the labels in `known` are left as they are.
@@ -74,6 +79,11 @@ pub(crate) fn gather(scene: &Scene, segments: &mut Segments, context: Context, k
         let shares = (0u32..).zip(&pixels).filter(|(label, _)| !known.contains(label)).map(share);
         let mut shares: Vec<Vec<usize>> = shares.filter(|share| !share.is_empty()).collect();
         shares.sort_by_key(|share| share.len());
+        // Where colours run into each other a blob goes on into the next thing.
+        let tint = |share: &Vec<usize>| Tint::of(&scene.scan.appearance(share).mean);
+        if let Some(main) = shares.last().map(tint) {
+            shares.retain(|share| tint(share).distance(&main) < OTHER);
+        }
         // All of it, or what lies before a larger thing of the same colour; then without what sticks out.
         let least = scene.min_segment_px();
         let (mut candidates, mut cores): (Vec<Vec<usize>>, Vec<Vec<usize>>) = Default::default();
@@ -88,7 +98,12 @@ pub(crate) fn gather(scene: &Scene, segments: &mut Segments, context: Context, k
         candidates.append(&mut cores);
         candidates.retain(|candidate| candidate.len() >= least);
         candidates.dedup();
-        let explained = |pixels| explained(scene, segments, context, pixels);
+        let measured = |share: &Vec<usize>| {
+            let label = share.first().map(|&at| segments.labels[at])?;
+            joins::Piece::measure(scene, segments, label, share.clone())
+        };
+        let pieces: Vec<joins::Piece> = shares.iter().filter(|share| share.len() >= least).filter_map(measured).collect();
+        let explained = |pixels| explained(scene, segments, context, pixels, &pieces);
         if let Some(found) = candidates.into_iter().find_map(explained) {
             *segments = found.segments;
             claim(scene, segments, found.label, known, &found.best);
@@ -109,6 +124,7 @@ fn explained<'a>(
     segments: &Segments,
     context: Context<'a>,
     pixels: Vec<usize>,
+    pieces: &[joins::Piece],
 ) -> Option<Gathered<'a>> {
     let mut segments =
         Segments { labels: segments.labels.clone(), count: segments.count, inner: segments.inner.clone() };
@@ -122,7 +138,8 @@ fn explained<'a>(
     let least = fits.first()?.score - SPOKEN_OF;
     let on_call = |found: &Hypothesis| found.model.template.on_call && found.score > least;
     let best = fits.into_iter().take(RUNNERS_UP).find(|found| on_call(found) && explains(found))?;
-    Some(Gathered { segments, label, best })
+    let few = pieces.len() <= FEW;
+    (!few || joins::is_one(context, &best, &piece, pieces)).then_some(Gathered { segments, label, best })
 }
 
 /// What is left of some pixels without what is thin at an end, as seen from above; `None` if that is nearly all or too
@@ -187,7 +204,7 @@ fn claim(scene: &Scene, segments: &mut Segments, label: u32, known: &Range<u32>,
         let other = segments.labels[at];
         let shown = (scene.scan.smooth[at] - depth as f32).abs() < NEAR_M;
         if other != NONE && other != label && !known.contains(&other) && shown {
-            let alike = scene.scan.tint(at).distance(&color) < 1.5 * ALIKE;
+            let alike = scene.scan.tint(at).distance(&color) < OTHER;
             if alike {
                 segments.labels[at] = label;
             }

@@ -240,13 +240,13 @@ impl<'a> Starts<'a> {
             starts.into_iter().map(|(model, start)| (rough_cost(&model, evidence, &start), model, start)).collect();
         rated.sort_by(|a, b| a.0.total_cmp(&b.0));
         let (rough, turns) = rated.first().map(|(rough, model, _)| (*rough, model.turns))?;
-        // Of what may lie across, the best that does so goes second.
+        // Of what is on call and may lie across, the best that does so goes second.
         let across = |(_, model, start): &(f64, Model, Vec<f64>)| {
             let heading = |start: &[f64], model: &Model| model.yaw_index().and_then(|yaw| start.get(yaw).copied());
             let (own, first) = (heading(start, model), rated.first().and_then(|(_, model, start)| heading(start, model)));
             own.zip(first).is_some_and(|(a, b)| (2.0 * (a - b)).cos() < 0.0)
         };
-        let two_sides = rated.first().is_some_and(|(_, model, _)| model.has_two_sides());
+        let two_sides = template.on_call && rated.first().is_some_and(|(_, model, _)| model.has_two_sides());
         if let Some(other) = rated.iter().position(across).filter(|_| two_sides) {
             let other = rated.remove(other);
             rated.insert(1, other);

@@ -42,6 +42,7 @@ const PARTED_OUTLINE: f64 = 0.75;
 const PARTED_GAIN: f64 = 10.0;
 const ONE_SURFACE: f64 = 0.93;
 const ONE_OUTLINE: f64 = 0.85;
+const ONE_OF_EITHER: f64 = 0.5;
 /// Tops of pieces of one thing are level within this.
 const LEVEL_M: f64 = 0.016;
 
@@ -312,15 +313,12 @@ fn compare(context: Context, joint: &Evidence, a: &Piece, b: &Piece) -> Option<C
     let apart = || rayon::join(|| fit(context, &a.evidence, 0.0), || fit(context, &b.evidence, 0.0));
     let (one, (left, right)) = rayon::join(|| fit(context, joint, 0.0), apart);
     let (one, left, right) = (one?, left?, right?);
-    let penalty = |h: &Hypothesis, evidence: &Evidence| {
-        h.minimum.cost + 0.5 * h.minimum.state.len() as f64 * evidence.independent().max(2.0).ln()
-    };
     // The joint evidence is thinned to the same number of points: compare per independent measurement.
     let share = (a.evidence.independent() + b.evidence.independent()) / joint.independent().max(1.0);
     let (on_surface, on_outline) = one.explained(joint);
     Some(Comparison {
-        together: penalty(&one, joint) * share.max(1.0),
-        apart: penalty(&left, &a.evidence) + penalty(&right, &b.evidence),
+        together: penalised(&one, joint) * share.max(1.0),
+        apart: penalised(&left, &a.evidence) + penalised(&right, &b.evidence),
         solids: one.model.solids(&one.minimum.state).len(),
         spoken_of: one.model.template.on_call,
         on_surface,
@@ -328,22 +326,39 @@ fn compare(context: Context, joint: &Evidence, a: &Piece, b: &Piece) -> Option<C
     })
 }
 
+/// What it costs to explain evidence: its misfit, and the freedom that it took.
+fn penalised(found: &Hypothesis, evidence: &Evidence) -> f64 {
+    found.minimum.cost + 0.5 * found.minimum.state.len() as f64 * evidence.independent().max(2.0).ln()
+}
+
+/// Whether `one` explains a piece as well as its pieces are explained one by one; a coincidence speaks for it.
+pub(crate) fn is_one(context: Context, one: &Hypothesis, whole: &Piece, pieces: &[Piece]) -> bool {
+    let each = |piece: &Piece| Some(penalised(&fit(context, &piece.evidence, piece.lowest_m)?, &piece.evidence));
+    let Some(apart) = pieces.par_iter().map(each).sum::<Option<f64>>() else { return true };
+    let independent: f64 = pieces.iter().map(|piece| piece.evidence.independent()).sum();
+    let share = independent / whole.evidence.independent().max(1.0);
+    penalised(one, &whole.evidence) * share.max(1.0) < apart + COINCIDENCE
+}
+
 /// Whether two pieces, which are `whole` together, are two things: two templates explain them well and better than one.
 pub(crate) fn apart_or_together(context: Context, whole: &Piece, a: &Piece, b: &Piece) -> bool {
     let one = |piece: &Piece| {
         let best = fit(context, &piece.evidence, piece.lowest_m)?;
-        let parameters = best.minimum.state.len() as f64;
-        let cost = best.minimum.cost + 0.5 * parameters * piece.evidence.independent().max(2.0).ln();
-        Some((cost, best.explained(&piece.evidence)))
+        let cost = penalised(&best, &piece.evidence);
+        let explained = best.explained(&piece.evidence);
+        Some((cost, explained, best))
     };
     let (together, (left, right)) = rayon::join(|| one(whole), || rayon::join(|| one(a), || one(b)));
-    let (Some((together, whole_explained)), Some((left, first)), Some((right, second))) = (together, left, right)
+    let (Some((together, whole_explained, best)), Some((left, first, _)), Some((right, second, _))) =
+        (together, left, right)
     else {
         return false;
     };
     let share = (a.evidence.independent() + b.evidence.independent()) / whole.evidence.independent().max(1.0);
     let explained = |(surface, outline): (f64, f64)| surface > PARTED_SURFACE && outline > PARTED_OUTLINE;
-    let well = whole_explained.0 > ONE_SURFACE && whole_explained.1 > ONE_OUTLINE;
+    // A small thing on a large one hardly counts in what is explained of both.
+    let of_either = [a, b].iter().all(|half| best.explained(&half.evidence).0 > ONE_OF_EITHER);
+    let well = whole_explained.0 > ONE_SURFACE && whole_explained.1 > ONE_OUTLINE && of_either;
     !well && explained(first) && explained(second) && left + right + PARTED_GAIN < together * share.max(1.0)
 }
 

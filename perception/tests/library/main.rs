@@ -12,7 +12,7 @@ mod world;
 use acm_concept::{
     expectation::Expectation,
     pose::Pose,
-    solid::PlacedSolid,
+    solid::{PlacedSolid, Solid},
     template::{Template, TemplateLibrary},
 };
 use acm_perception::{Grounder, GrounderConfig};
@@ -96,4 +96,53 @@ fn how_often_each_template_is_told_from_its_group() {
     }
     println!("all groups: {first} of {all}");
     assert!(2 * first > all, "chance is far below half");
+}
+
+/// A tray of which the floor is too low to stand clear of the table: five boards of two colours, and a cube on the floor.
+fn tray_with_a_cube(world: &mut World, x: f64, cube: bool) {
+    let (length, width, height, wall) = (0.165, 0.115, 0.022, 0.005);
+    let middle = DVec3::new(x, -0.12, TABLE_TOP_M);
+    let mut board = |size: DVec3, at: DVec3, color: [f64; 3]| {
+        let pose = Pose::from_yaw(middle + at.with_z(0.5 * size.z), 0.0);
+        world.things.push(Thing { solid: PlacedSolid { solid: Solid::Box { size }, pose }, color });
+    };
+    board(DVec3::new(width, length, 0.004), DVec3::ZERO, [0.85, 0.76, 0.5]);
+    let rim = [0.8, 0.6, 0.38];
+    for side in [-1.0, 1.0] {
+        let across = DVec3::X * side * 0.5 * (width - wall);
+        board(DVec3::new(wall, length, height), across, rim);
+        let along = DVec3::Y * side * 0.5 * (length - wall);
+        board(DVec3::new(width, wall, height), along, rim);
+    }
+    if cube {
+        let size = DVec3::splat(0.034);
+        let pose = Pose::from_yaw(middle + DVec3::new(0.005, 0.01, 0.004 + 0.5 * size.z), 0.4);
+        let solid = PlacedSolid { solid: Solid::Box { size }, pose };
+        world.things.push(Thing { solid, color: [0.8, 0.12, 0.1] });
+    }
+}
+
+#[test]
+fn low_trays_that_are_spoken_of_are_whole_with_what_lies_in_them() {
+    let library = Arc::new(acm_memory::whole_library().unwrap());
+    let grounder = Grounder::new(library, GrounderConfig::default());
+    let mut world = World::table();
+    [(-0.14, true), (0.0, false), (0.14, true)].into_iter().for_each(|(x, cube)| tray_with_a_cube(&mut world, x, cube));
+    let nouns = ["tray", "cube"].map(String::from).to_vec();
+    for seed in 0..3 {
+        let frame = Sensor::new(head_camera()).capture(&world, seed);
+        let percepts = grounder.ground(&frame, &Expectation { nouns: nouns.clone(), ..Expectation::default() });
+        let mut found: Vec<(&str, f64)> = Vec::new();
+        for object in &percepts.objects {
+            let part = &object.parts[0];
+            found.push((object.category.as_str(), part.pose.pose.translation.x));
+            if object.category == "tray" {
+                let sizes = [part.value("length").unwrap(), part.value("width").unwrap()];
+                assert!((sizes[0] - 0.165).abs() < 0.008 && (sizes[1] - 0.115).abs() < 0.010, "seed {seed}: {sizes:?}");
+            }
+        }
+        found.sort_by(|a, b| a.0.cmp(b.0).then(a.1.total_cmp(&b.1)));
+        let kinds: Vec<&str> = found.iter().map(|(category, _)| *category).collect();
+        assert_eq!(kinds, ["cube", "cube", "tray", "tray", "tray"], "seed {seed}: {found:?}");
+    }
 }
