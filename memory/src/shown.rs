@@ -164,7 +164,9 @@ fn differ(predicate: &str, a: &Term, b: &Term) -> bool {
 
 fn of(reading: &Reading, eye: DVec3, moment: Moment) -> Option<Shown> {
     let sure = reading.confidence >= SURE;
-    let shown = |predicate: &str, what, weight| Some(Shown { predicate: predicate.into(), what, weight, first: false, last: moment });
+    let shown = |predicate: &str, what, weight| {
+        Some(Shown { predicate: predicate.into(), what, weight, first: false, last: moment })
+    };
     match &reading.content {
         Content::Text { text, upright, turned } => {
             // What reads as well the other way up is taken as who looks at it sees it.

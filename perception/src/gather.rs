@@ -5,9 +5,9 @@ use crate::{
     hypotheses::{Context, Hypothesis},
     joins::{self, SPOKEN_OF},
     measure, raster,
+    scan::Tint,
     scene::Scene,
     segments::{NONE, Segments},
-    scan::Tint,
 };
 use glam::DVec2;
 use std::{
@@ -102,7 +102,8 @@ pub(crate) fn gather(scene: &Scene, segments: &mut Segments, context: Context, k
             let label = share.first().map(|&at| segments.labels[at])?;
             joins::Piece::measure(scene, segments, label, share.clone())
         };
-        let pieces: Vec<joins::Piece> = shares.iter().filter(|share| share.len() >= least).filter_map(measured).collect();
+        let pieces: Vec<joins::Piece> =
+            shares.iter().filter(|share| share.len() >= least).filter_map(measured).collect();
         let explained = |pixels| explained(scene, segments, context, pixels, &pieces);
         if let Some(found) = candidates.into_iter().find_map(explained) {
             *segments = found.segments;
@@ -151,7 +152,8 @@ fn core(scene: &Scene, pixels: &[usize]) -> Option<Vec<usize>> {
     let rectangle = measure::smallest(&measure::rectangles(&plan, PI / 60.0, 0.003))?;
     let mut core = known;
     for turn in [0.0, FRAC_PI_2] {
-        let (along, across) = (DVec2::from_angle(rectangle.yaw + turn), DVec2::from_angle(rectangle.yaw + turn + FRAC_PI_2));
+        let (along, across) =
+            (DVec2::from_angle(rectangle.yaw + turn), DVec2::from_angle(rectangle.yaw + turn + FRAC_PI_2));
         let slice = |pixel: &usize| (at(pixel).dot(along) / SLICE_M).floor() as i64;
         let mut widths: BTreeMap<i64, (f64, f64)> = BTreeMap::new();
         for pixel in &core {

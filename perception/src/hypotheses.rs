@@ -243,7 +243,8 @@ impl<'a> Starts<'a> {
         // Of what is on call and may lie across, the best that does so goes second.
         let across = |(_, model, start): &(f64, Model, Vec<f64>)| {
             let heading = |start: &[f64], model: &Model| model.yaw_index().and_then(|yaw| start.get(yaw).copied());
-            let (own, first) = (heading(start, model), rated.first().and_then(|(_, model, start)| heading(start, model)));
+            let (own, first) =
+                (heading(start, model), rated.first().and_then(|(_, model, start)| heading(start, model)));
             own.zip(first).is_some_and(|(a, b)| (2.0 * (a - b)).cos() < 0.0)
         };
         let two_sides = template.on_call && rated.first().is_some_and(|(_, model, _)| model.has_two_sides());

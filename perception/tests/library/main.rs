@@ -124,7 +124,9 @@ fn tray_with_a_cube(world: &mut World, x: f64, cube: bool) {
 
 #[test]
 fn low_trays_that_are_spoken_of_are_whole_with_what_lies_in_them() {
-    let library = Arc::new(acm_memory::whole_library().unwrap());
+    let mut groups = groups();
+    let library = groups.remove("core").unwrap();
+    let library = Arc::new(groups.into_values().fold(library, TemplateLibrary::with_on_call));
     let grounder = Grounder::new(library, GrounderConfig::default());
     let mut world = World::table();
     [(-0.14, true), (0.0, false), (0.14, true)].into_iter().for_each(|(x, cube)| tray_with_a_cube(&mut world, x, cube));
