@@ -99,7 +99,11 @@ impl Told {
                 lines.push(format!("told      \"{instruction}\""));
                 lines
             }
-            Message::Parsed { reading: Some(reading), .. } => vec![format!("read      {reading}")],
+            Message::Parsed { task, reading } => {
+                let corrections = task.iter().flat_map(|task| &task.corrections).map(ToString::to_string);
+                let told = reading.iter().map(ToString::to_string).chain(corrections);
+                told.map(|told| format!("read      {told}")).collect()
+            }
             Message::Updated { view, blindness, .. } => {
                 let mut lines: Vec<String> = self.blindness(*blindness, at).into_iter().collect();
                 lines.extend(self.changes(&*view.0, at));

@@ -117,7 +117,8 @@ fn text(message: &Message) -> String {
             match task {
                 Ok(task) => {
                     let subtasks = task.subtasks.iter().enumerate().map(|(i, s)| format!("{} \"{}\"", i + 1, s.text));
-                    format!("{} subtasks{}{read}", task.subtasks.len(), listed(": ", subtasks, ""))
+                    let corrections = listed("; ", task.corrections.iter().map(ToString::to_string), "");
+                    format!("{} subtasks{}{corrections}{read}", task.subtasks.len(), listed(": ", subtasks, ""))
                 }
                 Err(reason) => format!("not understood: {reason}{read}"),
             }

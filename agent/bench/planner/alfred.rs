@@ -3,7 +3,7 @@
 //! A description is read with what there is in its room (types of objects and receptacles over all episodes of the
 //! floor plan). Compared are types, not things: what is moved, where it ends, its states, how many, what is switched on.
 
-use super::inventory::{Abilities, Type};
+use super::inventory::{Abilities, Type, slug};
 use acm_concept::template::TemplateLibrary;
 use acm_planner::{
     Destination, Goal, Planner, Task,
@@ -53,7 +53,8 @@ pub struct Annotation {
 pub enum Outcome {
     /// The goal is the episode's.
     Right,
-    /// What it asks for is a part of the episode's goal, of which the description leaves out the rest.
+    /// What it asks for is a part of the episode's goal, of which the description leaves out the rest: the reading has all
+    /// that the description names, or a place by what stands beside it.
     SaysLess,
     /// It is not, and nothing was said.
     SilentlyWrong,
@@ -221,6 +222,7 @@ impl Asked {
             Goal::State { predicate, object, holds: true, .. } if predicate == "switched-on" => {
                 self.on.insert(*object);
             }
+            Goal::State { predicate, holds: false, .. } if predicate == "switched-on" => self.other = true,
             Goal::State { predicate, object, holds: true, .. } if predicate != "open" => {
                 self.states.entry(*object).or_default().insert(predicate.clone());
             }
@@ -246,12 +248,34 @@ pub fn score(planner: &Planner, rooms: &Rooms, episode: &Episode, text: &str) ->
         }
         Ok(task) => {
             let outcome = match compare(&task, library, episode) {
+                Outcome::SaysLess if passes_over(&task, library, episode, text) => Outcome::SilentlyWrong,
                 Outcome::SilentlyWrong if confused(episode, text) => Outcome::Confused,
                 outcome => outcome,
             };
             (outcome, task.outline().join("; "))
         }
     }
+}
+
+/// Whether the text names a thing of the goal that the reading has not: then it is the reading that says less.
+fn passes_over(task: &Task, library: &TemplateLibrary, episode: &Episode, text: &str) -> bool {
+    let said = text.to_lowercase().replace(|c: char| !c.is_alphabetic(), " ");
+    let mut said = format!(" {} ", said.split_whitespace().collect::<Vec<_>>().join(" "));
+    // The coffee mug is no coffee machine.
+    for noun in task.references.iter().filter_map(|known| known.noun.as_deref()) {
+        said = said.replace(noun, "");
+    }
+    let params = &episode.pddl_params;
+    [&params.object_target, &params.mrecep_target, &params.parent_target, &params.toggle_target].into_iter().any(
+        |target| {
+            let Some(template) = library.get(&slug(&snake(target))) else { return false };
+            let nouns: Vec<&str> = template.synopsis.nouns.iter().map(|noun| noun.noun.as_str()).collect();
+            let named =
+                nouns.iter().any(|noun| [format!(" {noun} "), format!(" {noun}s ")].iter().any(|n| said.contains(n)));
+            named
+                && !task.references.iter().any(|known| known.noun.as_deref().is_some_and(|noun| nouns.contains(&noun)))
+        },
+    )
 }
 
 /// Whether the text has the name of a type that is confused with one of the goal's, and not that one's own.
@@ -363,6 +387,10 @@ fn says_less(
     let lamp = |is: &mut dyn FnMut(ReferenceIndex, &str) -> bool, on: &ReferenceIndex| is(*on, &params.toggle_target);
     let placed = asked.place.iter().all(|(object, destination)| {
         let Some(place) = place_of(destination) else { return false };
+        // What stands beside a thing stands on something that is not said.
+        if matches!(destination, Destination::Beside { .. }) && is(*object, &params.object_target) {
+            return true;
+        }
         let knife = ["Knife", "ButterKnife"].iter().any(|knife| is(*object, knife)) && params.object_sliced;
         let object_goes = is(*object, &params.object_target)
             && (is(place, &params.parent_target) || is(place, &params.mrecep_target));

@@ -6,7 +6,7 @@
 mod raw;
 
 use crate::task::{ColorTerm, Direction, Size, Variation};
-use acm_concept::color::Lab;
+use acm_concept::{color::Lab, template::TemplateLibrary};
 use acm_memory::query::PlaceReference;
 use serde::Deserialize;
 use std::collections::{BTreeMap, BTreeSet};
@@ -103,8 +103,8 @@ pub(crate) enum FrameGoal {
     Performed(String),
     /// A predicate holds of the object, or does not.
     State(String, bool),
-    /// Something about the object, a group, is varied until a sign shows.
-    Find(Variation),
+    /// Something about the object, a group, is varied until a sign shows; the form says what.
+    Find,
     /// Nothing is done before the condition holds.
     Await,
     /// Nothing has to be done.
@@ -117,9 +117,13 @@ pub(crate) struct FrameForm {
     pub form: Form,
     pub history: Option<PlaceReference>,
     pub times: Option<u32>,
+    /// What is tried, for the goal `find`.
+    pub vary: Option<Variation>,
+    /// Only together with what says when it is right.
+    pub needs_sign: bool,
 }
 
-/// Verbs that are used alike.
+/// Verbs that are used alike, in one of their senses.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Frame {
     pub name: String,
@@ -131,8 +135,6 @@ pub(crate) struct Frame {
     pub into: Option<String>,
     /// What the object goes into is whatever contains: "insert".
     pub into_any: bool,
-    /// Only together with what says when it is right.
-    pub needs_sign: bool,
     pub forms: Vec<FrameForm>,
 }
 
@@ -150,10 +152,8 @@ pub(crate) enum ModifierKind {
     If,
     /// Only if it does not.
     Unless,
-    /// Beginning at a side.
-    From,
-    /// In the order in which the things are named.
-    ThatOrder,
+    /// In which order: beginning at a side, or as the things are named.
+    Order,
     /// To try what stands there.
     EachTry,
     /// One thing after the other.
@@ -162,10 +162,8 @@ pub(crate) enum ModifierKind {
     OneToAPlace,
     /// A place for what is put aside.
     Aside,
-    /// Each takes the other's place.
+    /// Each takes the other's place, perhaps with its heading.
     TakesPlace,
-    /// And its heading.
-    TakesHeading,
     /// What is tried may lie the other way round.
     MayTurn,
 }
@@ -174,6 +172,8 @@ pub(crate) enum ModifierKind {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ModifierForm {
     pub kind: ModifierKind,
+    /// Whether what takes another one's place takes over its heading.
+    pub heading: bool,
     pub form: Form,
 }
 
@@ -258,6 +258,8 @@ pub(crate) struct Words {
     pub otherwise: Vec<Form>,
     pub once_markers: Vec<Form>,
     pub there: Vec<Form>,
+    pub whereabouts: Vec<Form>,
+    pub above: Vec<Form>,
 }
 
 /// Everything the front end knows of language.
@@ -285,6 +287,8 @@ pub struct Lexicon {
     pub(crate) history: Vec<HistoryForm>,
     /// Every single word that some class holds, to tell an unknown noun from a misplaced word.
     pub(crate) known_words: BTreeSet<String>,
+    /// Every single word of a noun, or of an everyday word for one.
+    pub(crate) noun_words: BTreeSet<String>,
 }
 
 impl Lexicon {
@@ -306,6 +310,19 @@ impl Lexicon {
     /// All everyday words for nouns.
     pub fn everyday_words(&self) -> impl Iterator<Item = &str> {
         self.aliases.keys().map(String::as_str)
+    }
+    /// The everyday words for the nouns of a library.
+    pub(crate) fn everyday_words_of(&self, library: &TemplateLibrary) -> impl Iterator<Item = &str> {
+        let there = |noun: &String| library.with_noun(noun).next().is_some();
+        self.aliases.iter().filter(move |(_, nouns)| nouns.iter().any(there)).map(|(word, _)| word.as_str())
+    }
+    /// All words of the classes, forms and verbs.
+    pub(crate) fn every_word(&self) -> impl Iterator<Item = &str> {
+        self.known_words.iter().map(String::as_str)
+    }
+    /// Whether a word is one: of a class, a form or a verb, or part of a noun or of an everyday word for one.
+    pub(crate) fn knows(&self, word: &str) -> bool {
+        self.known_words.contains(word) || self.noun_words.contains(word)
     }
     /// The everyday words for a noun.
     pub fn words_for(&self, noun: &str) -> Vec<&str> {

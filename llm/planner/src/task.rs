@@ -43,6 +43,26 @@ pub struct Task {
     /// What the instruction says of the way of doing it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub manners: Vec<Manner>,
+    /// Words that were taken for typing errors, and what they were read as.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub corrections: Vec<Correction>,
+}
+
+/// A word of an instruction that nobody knows, and the known word that it was read as.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Correction {
+    /// As it is written.
+    pub text: String,
+    /// Where it stands in the instruction.
+    pub span: Span,
+    /// What it was read as.
+    pub read: String,
+}
+
+impl std::fmt::Display for Correction {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "`{}` is no word that I know and was read as `{}`", self.text, self.read)
+    }
 }
 
 /// What an instruction says of the way of doing it: it asks for no goal of its own.

@@ -106,9 +106,20 @@ fn an_unknown_noun_is_named_with_its_span() {
         matches!(&error, ParseError::UnknownNoun { text, known, .. } if text == "coffee machine" && known.contains("cube"))
     );
     assert_eq!(error.span().unwrap().of(text), "coffee machine");
-    assert!(parse("Bring the cbue to the middle.").unwrap_err().to_string().contains("did you mean `cube`"));
+    assert!(parse("Bring the cubo to the middle.").unwrap_err().to_string().contains("did you mean `cube`"));
     let text = "Put the red cube on the banana, then press the button.";
     assert_eq!(parse(text).unwrap_err().span().unwrap().of(text), "banana");
+}
+
+#[test]
+fn a_typing_error_is_read_as_what_it_nearly_is_and_that_is_kept() {
+    let text = "Bring the cbue to the mddle, press teh button, then return it to where it came from.";
+    let task = parse(text).unwrap();
+    assert_eq!(task.outline(), outline(CANONICAL));
+    let corrections: Vec<(&str, &str)> =
+        task.corrections.iter().map(|correction| (correction.span.of(text), correction.read.as_str())).collect();
+    assert_eq!(corrections, [("cbue", "cube"), ("mddle", "middle"), ("teh", "the")]);
+    assert_eq!(parse(CANONICAL).unwrap().corrections, []);
 }
 
 #[test]

@@ -39,6 +39,7 @@ fn task(references: Vec<ObjectReference>, goals: Vec<Goal>) -> Task {
         untouched: Vec::new(),
         nouns: Vec::new(),
         manners: Vec::new(),
+        corrections: Vec::new(),
     }
 }
 

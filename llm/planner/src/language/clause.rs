@@ -3,7 +3,7 @@
 use super::{
     reader::{Captures, Expected, Reader},
     role::Role,
-    syntax::{Clause, NounPhrase, PlaceKind, PlacePhrase, Relation},
+    syntax::{Clause, NounPhrase, PlaceKind, PlacePhrase, Pronoun, Relation},
 };
 use crate::lexicon::{FrameForm, FrameGoal};
 use std::cmp::Reverse;
@@ -28,7 +28,10 @@ impl Reader<'_> {
         for (subject, end) in self.noun_phrase_lists(at, 0) {
             readings.extend(self.subject_readings(at, end, &subject));
         }
-        if let Some(frame) = last_frame {
+        // "Swap the two cubes, the red one and the green one" is no second exchange.
+        let exchange =
+            |frame: usize| self.lexicon.frames.get(frame).is_some_and(|known| known.goal == FrameGoal::Exchange);
+        if let Some(frame) = last_frame.filter(|frame| !exchange(*frame)) {
             readings.extend(self.frame_readings(at, at, frame, None));
         }
         let ends_well = |end: usize| {
@@ -44,7 +47,11 @@ impl Reader<'_> {
                 self.fail(end, Expected::Other("the end of the clause"));
                 continue;
             }
-            let rank = |clause: &Clause, end: usize| (end, Reverse(clause.places_named()), self.described_last(clause));
+            // What asks for something goes before what only mentions it.
+            let asks = |clause: &Clause| clause.goal != FrameGoal::Nothing;
+            let rank = |clause: &Clause, end: usize| {
+                (end, asks(clause), Reverse(clause.places_named()), self.described_last(clause))
+            };
             if best.as_ref().is_none_or(|(best, longest)| rank(&clause, end) > rank(best, *longest)) {
                 best = Some((clause, end));
             }
@@ -53,6 +60,19 @@ impl Reader<'_> {
             self.insist(at, Expected::Verb);
         }
         best
+    }
+
+    /// "Heat and slice the bread": two clauses, the first of which leaves its object to the second.
+    pub fn sharing(&self, at: usize) -> Option<(Clause, Clause, usize)> {
+        let next = self.longest(at + 1, &self.lexicon.words.connectors)?;
+        let (mut second, end) = self.clause(next, None, false)?;
+        let object = second.object.clone().filter(|object| object.pronoun.is_none() && second.also.is_empty())?;
+        let pronoun = if object.several() { Pronoun::Several } else { Pronoun::One };
+        let subject = (object, Vec::new());
+        let readings = self.verb_readings(at, at, Some(&subject)).into_iter();
+        let (first, _) = readings.filter(|(_, ends)| *ends == at + 1).min_by_key(|(first, _)| first.frame)?;
+        second.object = Some(NounPhrase { pronoun: Some(pronoun), ..self.blank(next, next + 1) });
+        Some((first, second, end))
     }
 
     /// Whether what stands last describes the place and not the thing: "the fork in the mug on the table" goes into the
@@ -119,7 +139,7 @@ impl Reader<'_> {
         }
         let given = said_of(subject);
         let mut readings = Vec::new();
-        for (number, FrameForm { form, history, times }) in frame.forms.iter().enumerate() {
+        for (number, FrameForm { form, history, times, .. }) in frame.forms.iter().enumerate() {
             for (captures, end) in self.form(at, form, &given, 0) {
                 // The form with nothing in it must not swallow a clause that left its verb out.
                 if end == begin {

@@ -60,6 +60,7 @@ impl Reader<'_> {
                     thing,
                     condition: captures.condition,
                     side: captures.side,
+                    heading: modifier.heading,
                     list: captures.list,
                     form: index,
                 };

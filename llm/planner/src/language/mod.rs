@@ -16,6 +16,7 @@ mod reader;
 mod role;
 mod rules;
 mod sentence;
+mod spelling;
 mod syntax;
 mod token;
 
@@ -32,19 +33,35 @@ use std::collections::BTreeSet;
 use syntax::Sentence;
 use token::Token;
 
-/// Reads an instruction with the nouns and functions of a library.
+/// Reads an instruction with the nouns and functions of a library; where it has no reading, with its typing errors put
+/// right.
 pub(crate) fn parse(lexicon: &Lexicon, library: &TemplateLibrary, text: &str) -> Result<Task, ParseError> {
-    let sentences = sentences(lexicon, library, text)?;
-    interpret::interpret(lexicon, library, text, &sentences)
+    let read = |tokens: &[Token]| {
+        let sentences = sentences(lexicon, library, text, tokens)?;
+        interpret::interpret(lexicon, library, text, &sentences)
+    };
+    let tokens = token::tokenize(text)?;
+    read(&tokens).or_else(|error| {
+        let Some((tokens, corrections)) = spelling::corrected(lexicon, library, text, &tokens) else {
+            return Err(error);
+        };
+        let task = read(&tokens).map_err(|_| error)?;
+        Ok(Task { corrections, ..task })
+    })
 }
 
 /// The names of the rules that the reading of an instruction rests on.
 pub(crate) fn rules(lexicon: &Lexicon, library: &TemplateLibrary, text: &str) -> Result<BTreeSet<String>, ParseError> {
-    Ok(rules::rules(lexicon, &sentences(lexicon, library, text)?))
+    Ok(rules::rules(lexicon, &sentences(lexicon, library, text, &token::tokenize(text)?)?))
 }
 
-fn sentences(lexicon: &Lexicon, library: &TemplateLibrary, text: &str) -> Result<Vec<Sentence>, ParseError> {
-    let tokens = without_ignored(lexicon, library, token::tokenize(text)?);
+fn sentences(
+    lexicon: &Lexicon,
+    library: &TemplateLibrary,
+    text: &str,
+    tokens: &[Token],
+) -> Result<Vec<Sentence>, ParseError> {
+    let tokens = without_ignored(lexicon, library, tokens);
     if tokens.iter().all(|token| token.stop) {
         return Err(ParseError::Empty);
     }
@@ -57,9 +74,9 @@ fn sentences(lexicon: &Lexicon, library: &TemplateLibrary, text: &str) -> Result
 }
 
 /// Drops words that say nothing here ("please", "carefully").
-fn without_ignored(lexicon: &Lexicon, library: &TemplateLibrary, tokens: Vec<Token>) -> Vec<Token> {
+fn without_ignored(lexicon: &Lexicon, library: &TemplateLibrary, tokens: &[Token]) -> Vec<Token> {
     let kept = {
-        let reader = Reader::new(lexicon, library, &tokens);
+        let reader = Reader::new(lexicon, library, tokens);
         let mut kept = Vec::with_capacity(tokens.len());
         let mut at = 0;
         while at < tokens.len() {
@@ -74,8 +91,8 @@ fn without_ignored(lexicon: &Lexicon, library: &TemplateLibrary, tokens: Vec<Tok
         kept
     };
     let mut keep = kept.into_iter().peekable();
-    let chosen = |(at, _): &(usize, Token)| keep.next_if_eq(at).is_some();
-    tokens.into_iter().enumerate().filter(chosen).map(|(_, token)| token).collect()
+    let chosen = |(at, _): &(usize, &Token)| keep.next_if_eq(at).is_some();
+    tokens.iter().enumerate().filter(chosen).map(|(_, token)| token.clone()).collect()
 }
 
 /// The farthest failure as an error.

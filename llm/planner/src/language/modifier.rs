@@ -74,10 +74,25 @@ impl Reader<'_> {
         let words = &self.lexicon.words;
         let mut places: Places = self.between(at, depth + 1);
         places.extend(self.beside(at, depth + 1));
+        // "the cabinet above the sink": near it, as far as it tells things apart.
+        for end in self.class(at, &words.above) {
+            let things = self.noun_phrases(end, depth + 1).into_iter();
+            let near = |(thing, end): (NounPhrase, usize)| {
+                (PlacePhrase { span: self.span(at, end), kind: PlaceKind::Beside(thing, None) }, end)
+            };
+            places.extend(things.map(near));
+        }
         let mut own = Vec::new();
         let ends = self.relations(at).into_iter().filter(|(relation, _)| *relation != Relation::To);
         let sources = self.class(at, &words.sources).into_iter().map(|end| (Relation::To, end));
-        for (relation, end) in ends.chain(sources) {
+        // "from under the desk", "from beside the can".
+        let from: Vec<(Relation, usize)> = sources.collect();
+        for (_, end) in &from {
+            places.extend(self.beside(*end, depth + 1));
+        }
+        let behind =
+            from.iter().flat_map(|(_, end)| self.relations(*end)).filter(|(relation, _)| *relation != Relation::To);
+        for (relation, end) in ends.chain(behind).chain(from.iter().copied()) {
             let found = self.bare_places(end, relation, depth + 1);
             // "the cube from its mat", "from the mat it is on": wherever it stands, so it tells nothing apart.
             let its = self.is_word(end, "its");
@@ -144,13 +159,14 @@ impl Reader<'_> {
         for start in self.class(at, &words.containing) {
             // "a holder with a gauge": what shows something is part of it.
             readings.extend(self.signs(start).into_iter().map(|end| (phrase.clone(), end)));
-            for (content, end) in self.noun_phrases(start, depth + 1) {
+            for ((first, also), end) in self.noun_phrase_lists(start, depth + 1) {
                 let contains = Role::Affordance(CONTAINS).fits(self.library, phrase.noun.as_deref());
                 let inside = self.longest(end, &words.prepositions_in).is_some();
                 let mut ends = if inside && !contains { Vec::new() } else { self.class(end, &words.within_it) };
                 ends.push(end);
                 for end in ends {
-                    readings.push((NounPhrase { contains: vec![content.clone()], ..phrase.clone() }, end));
+                    let contains = [std::slice::from_ref(&first), &also].concat();
+                    readings.push((NounPhrase { contains, ..phrase.clone() }, end));
                 }
             }
         }

@@ -3,7 +3,7 @@
 use super::reader::Reader;
 
 /// The state of what is spoken of as a slice.
-const SLICED: &str = "sliced";
+pub(super) const SLICED: &str = "sliced";
 /// Words of the longest noun.
 const MAX_WORDS: usize = 4;
 

@@ -1,6 +1,7 @@
 //! Noun phrases: determiners, adjectives, and the noun.
 
 use super::{
+    noun::SLICED,
     reader::{Expected, MAX_READINGS, Reader},
     syntax::{NounPhrase, Pronoun},
 };
@@ -49,6 +50,12 @@ impl Reader<'_> {
         for end in self.class(at, &self.lexicon.words.what) {
             let named = self.modified(self.blank(at, end), end, depth).into_iter();
             readings.extend(named.filter(|(phrase, _)| phrase.located.is_some()));
+        }
+        // "the edge of the tub" is the tub.
+        let article = self.longest(at, &self.lexicon.words.definite).unwrap_or(at);
+        let article = self.meaning(article, &self.lexicon.directions).map_or(article, |(_, end)| end);
+        for end in self.class(article, &self.lexicon.words.whereabouts) {
+            readings.extend(self.noun_phrases(end, depth + 1).into_iter().filter(|(phrase, _)| phrase.noun.is_some()));
         }
         keep_longest_first(&mut readings);
         self.know_phrases(at, depth, &readings);
@@ -135,7 +142,7 @@ impl Reader<'_> {
         let mut heads = Vec::new();
         let mut elided: Phrases = Vec::new();
         // "each behind its cube": a side may also begin a place.
-        if determiner.each && self.meaning(start, &self.lexicon.directions).is_some() {
+        if determiner.each && self.meaning(start, &self.lexicon.beside).is_some() {
             elided.push((NounPhrase { elided: true, ..phrase.clone() }, start));
         }
         // Adjectives parted by a comma or "and" need their noun.
@@ -155,6 +162,12 @@ impl Reader<'_> {
         }
         let words = &self.lexicon.words;
         heads.extend(self.twin(&phrase, determiner, end));
+        // "cook a slice": of what was spoken of.
+        if let Some(next) = self.longest(end, &words.slices).filter(|_| heads.is_empty() && end > at) {
+            let mut states = phrase.states.clone();
+            states.push((SLICED.into(), true));
+            heads.push((NounPhrase { elided: true, states, ..phrase.clone() }, next));
+        }
         if heads.is_empty() {
             if let Some(next) = self.longest(end, &words.things).filter(|_| end > at) {
                 let elided = self.longest(end, &words.ones).is_some();
@@ -196,6 +209,17 @@ impl Reader<'_> {
             if reading.plural && phrase.quantity == Quantity::TheOne {
                 phrase.quantity = Quantity::Group;
             }
+            // "the desk drawer" is the drawer of the desk.
+            if let Some(part) = self.noun(reading.end).filter(|_| !reading.plural && phrase.part_of.is_none()) {
+                let whole = NounPhrase { noun: phrase.noun.clone(), ..self.blank(end, reading.end) };
+                let quantity = match (part.plural, phrase.quantity) {
+                    (true, Quantity::TheOne) => Quantity::Group,
+                    (_, quantity) => quantity,
+                };
+                let part_of = Some(Box::new(whole));
+                let compound = NounPhrase { noun: Some(part.noun), part_of, quantity, ..phrase.clone() };
+                named.push((compound, part.end));
+            }
             named.push((phrase, reading.end));
         }
         named
@@ -220,6 +244,11 @@ impl Reader<'_> {
         }
         if let Some((state, holds, end)) = self.state_adjective(at) {
             phrase.states.push((state, holds));
+            return Some(end);
+        }
+        // "the slice apple".
+        if let Some(end) = self.longest(at, &words.slices).filter(|end| self.noun(*end).is_some()) {
+            phrase.states.push((SLICED.into(), true));
             return Some(end);
         }
         if let Some(end) = self.longest(at, &words.free) {

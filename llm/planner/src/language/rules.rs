@@ -81,7 +81,8 @@ impl Rules<'_> {
     }
 
     fn statement(&mut self, statement: &Statement) {
-        self.add("state", &statement.predicate);
+        // The word for a state is one like a noun.
+        self.add("statement", if statement.about.is_some() { "of a thing" } else { "of the moment" });
         statement.about.iter().for_each(|about| self.phrase(about));
         statement.place.iter().for_each(|place| self.place(place));
     }

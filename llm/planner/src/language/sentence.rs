@@ -95,9 +95,17 @@ impl Reader<'_> {
         } else if let Some((things, end)) = self.there(at).filter(|_| !begun) {
             (Sentence::There { things }, end)
         } else {
-            let (clause, end) = clause(at, course.last_frame, false)?;
-            course.last_frame = Some(clause.frame);
             let order = if course.main_comes_before { Order::BeforeLast } else { Order::Last };
+            let (clause, end) = match clause(at, course.last_frame, false) {
+                Some(read) => read,
+                None => {
+                    let (first, second, end) = self.sharing(at)?;
+                    let clause = Box::new(first);
+                    course.sentences.push(Sentence::Do { clause, order, background: false, guard: guard.clone() });
+                    (Box::new(second), end)
+                }
+            };
+            course.last_frame = Some(clause.frame);
             (Sentence::Do { clause, order, background: false, guard }, end)
         };
         course.sentences.push(sentence);
@@ -113,10 +121,10 @@ impl Reader<'_> {
         let mut start = at;
         while let Some((mut modifier, end)) = self.clause_modifier(start) {
             let belongs = match modifier.kind {
-                ModifierKind::From | ModifierKind::OneAtATime | ModifierKind::OneToAPlace | ModifierKind::EachTry => {
+                ModifierKind::Order | ModifierKind::OneAtATime | ModifierKind::OneToAPlace | ModifierKind::EachTry => {
                     fresh
                 }
-                ModifierKind::Aside | ModifierKind::ThatOrder | ModifierKind::Shown => fresh,
+                ModifierKind::Aside | ModifierKind::Shown => fresh,
                 ModifierKind::ShownFirst => true,
                 _ => false,
             };
@@ -127,7 +135,8 @@ impl Reader<'_> {
                 modifier.kind = ModifierKind::Shown;
             }
             modifiers.push(modifier);
-            start = if self.is_comma(end) { end + 1 } else { end };
+            let parted = self.is_comma(end) || self.tokens.get(end).is_some_and(|token| token.text == ":");
+            start = if parted { end + 1 } else { end };
         }
         let start = self.longest(start, &self.lexicon.words.lead_ins).unwrap_or(start);
         (!modifiers.is_empty() && self.clause(start, None, false).is_some()).then_some((modifiers, start))

@@ -92,6 +92,8 @@ pub(super) struct Modifier {
     pub thing: Option<NounPhrase>,
     pub condition: Option<Statement>,
     pub side: Option<Direction>,
+    /// Whether what takes another one's place takes over its heading.
+    pub heading: bool,
     /// What it names one after the other.
     pub list: Vec<NounPhrase>,
     /// Index of its form among the lexicon's.
@@ -184,6 +186,15 @@ impl Clause {
         self.object.as_ref().map_or(0, NounPhrase::places_named)
             + self.also.iter().map(NounPhrase::places_named).sum::<usize>()
             + self.place.as_ref().map_or(0, PlacePhrase::places_named)
+    }
+    /// The side at which a group is begun, with the modifier that says so.
+    pub fn from_side(&self) -> Option<(&Modifier, Direction)> {
+        let orders = self.modifiers.iter().filter(|modifier| modifier.kind == ModifierKind::Order);
+        orders.filter_map(|modifier| Some((modifier, modifier.side?))).next()
+    }
+    /// The modifier that says that things are taken as they are named.
+    pub fn as_named(&self) -> Option<&Modifier> {
+        self.modifiers.iter().find(|modifier| modifier.kind == ModifierKind::Order && modifier.side.is_none())
     }
     /// The modifier of a kind, if the clause has one.
     pub fn modifier(&self, kind: ModifierKind) -> Option<&Modifier> {

@@ -65,6 +65,8 @@ struct RawWords {
     otherwise: Vec<String>,
     once_markers: Vec<String>,
     there: Vec<String>,
+    whereabouts: Vec<String>,
+    above: Vec<String>,
     counts: BTreeMap<String, u32>,
     directions: BTreeMap<Direction, Vec<String>>,
     beside: BTreeMap<String, Vec<String>>,
@@ -124,6 +126,8 @@ struct RawModifiers {
 #[serde(deny_unknown_fields)]
 struct RawModifier {
     kind: ModifierKind,
+    #[serde(default)]
+    heading: bool,
     forms: Vec<String>,
 }
 
@@ -172,17 +176,28 @@ struct RawFrame {
     predicate: Option<String>,
     #[serde(default = "holds")]
     holds: bool,
-    vary: Option<Variation>,
     tool_state: Option<String>,
+    #[serde(default)]
+    said_of_object: bool,
+    #[serde(default)]
+    verbs: Vec<String>,
+    #[serde(default)]
+    senses: Vec<RawSense>,
+    forms: Vec<RawForm>,
+}
+
+/// Verbs of a frame with what they mean beyond it.
+#[derive(Deserialize, Default, Clone)]
+#[serde(deny_unknown_fields)]
+struct RawSense {
+    verbs: Vec<String>,
+    predicate: Option<String>,
+    holds: Option<bool>,
     into: Option<String>,
     #[serde(default)]
     into_any: bool,
-    #[serde(default)]
-    needs_sign: bool,
-    #[serde(default)]
-    said_of_object: bool,
-    verbs: Vec<String>,
-    forms: Vec<RawForm>,
+    particle: Option<String>,
+    with: Option<String>,
 }
 
 #[derive(Deserialize)]
@@ -191,6 +206,9 @@ struct RawForm {
     form: String,
     history: Option<PlaceReference>,
     times: Option<u32>,
+    vary: Option<Variation>,
+    #[serde(default)]
+    needs_sign: bool,
 }
 
 #[derive(Deserialize)]
@@ -216,7 +234,8 @@ pub(super) fn parse(files: &BTreeMap<String, String>) -> Result<Lexicon, Lexicon
     let states: RawStates = read(files, "states.toml")?;
     let modifiers: RawModifiers = read(files, "modifiers.toml")?;
 
-    let frames = verbs.frame.iter().map(frame).collect::<Result<Vec<_>, _>>()?;
+    let senses: Vec<(&RawFrame, RawSense)> = verbs.frame.iter().flat_map(senses).collect();
+    let frames = senses.iter().map(|(raw, sense)| frame(raw, sense)).collect::<Result<Vec<_>, _>>()?;
     let mut history_forms = Vec::new();
     for phrase in &history.phrase {
         for text in &phrase.forms {
@@ -237,12 +256,16 @@ pub(super) fn parse(files: &BTreeMap<String, String>) -> Result<Lexicon, Lexicon
         modifiers: modifier_forms(&modifiers)?,
         aliases: aliases(nouns.alias.iter().chain(&household.alias)),
         plurals: nouns.plurals.into_iter().chain(household.plurals).collect(),
-        verbs: verb_forms(&verbs),
+        verbs: verb_forms(&senses, &verbs.irregular),
         frames,
         history: history_forms,
         known_words: BTreeSet::new(),
+        noun_words: BTreeSet::new(),
     };
     lexicon.known_words = known_words(&lexicon);
+    let nouns = lexicon.aliases.iter().flat_map(|(word, nouns)| nouns.iter().chain([word]));
+    lexicon.noun_words =
+        nouns.chain(lexicon.plurals.keys()).flat_map(|noun| noun.split_whitespace()).map(str::to_owned).collect();
     Ok(lexicon)
 }
 
@@ -311,6 +334,8 @@ fn closed_classes(raw: &RawWords) -> Result<Words, LexiconError> {
         otherwise: phrases(&raw.otherwise)?,
         once_markers: phrases(&raw.once_markers)?,
         there: phrases(&raw.there)?,
+        whereabouts: phrases(&raw.whereabouts)?,
+        above: phrases(&raw.above)?,
     })
 }
 
@@ -353,53 +378,75 @@ fn modifier_forms(raw: &RawModifiers) -> Result<Vec<ModifierForm>, LexiconError>
     let mut forms = Vec::new();
     for modifier in &raw.modifier {
         for text in &modifier.forms {
-            forms.push(ModifierForm { kind: modifier.kind, form: form("modifiers.toml", text)? });
+            forms.push(ModifierForm {
+                kind: modifier.kind,
+                heading: modifier.heading,
+                form: form("modifiers.toml", text)?,
+            });
         }
     }
     Ok(forms)
 }
 
-fn frame(raw: &RawFrame) -> Result<Frame, LexiconError> {
+/// The senses of a frame: its own where it has verbs of its own, then those it lists.
+fn senses(raw: &RawFrame) -> Vec<(&RawFrame, RawSense)> {
+    let own = RawSense { verbs: raw.verbs.clone(), ..RawSense::default() };
+    let own = (!raw.verbs.is_empty()).then_some(own);
+    own.into_iter().chain(raw.senses.iter().cloned()).map(|sense| (raw, sense)).collect()
+}
+
+/// A frame in one of its senses.
+fn frame(raw: &RawFrame, sense: &RawSense) -> Result<Frame, LexiconError> {
     let wrong = |reason: &str| LexiconError::Form {
         file: "verbs.toml".into(),
         form: raw.name.clone(),
         reason: reason.to_owned(),
     };
-    let goal = match (raw.goal.as_str(), &raw.function, &raw.predicate, raw.vary) {
-        ("at", None, None, None) => FrameGoal::At,
-        ("exchange", None, None, None) => FrameGoal::Exchange,
-        ("holding", None, None, None) => FrameGoal::Holding(raw.holds),
-        ("performed", Some(function), None, None) => FrameGoal::Performed(function.clone()),
-        ("state", None, Some(predicate), None) => FrameGoal::State(predicate.clone(), raw.holds),
-        ("find", None, None, Some(vary)) => FrameGoal::Find(vary),
-        ("await", None, None, None) => FrameGoal::Await,
-        ("nothing", None, None, None) => FrameGoal::Nothing,
+    let holds = sense.holds.unwrap_or(raw.holds);
+    let goal = match (raw.goal.as_str(), &raw.function, sense.predicate.as_ref().or(raw.predicate.as_ref())) {
+        ("at", None, None) => FrameGoal::At,
+        ("exchange", None, None) => FrameGoal::Exchange,
+        ("holding", None, None) => FrameGoal::Holding(holds),
+        ("performed", Some(function), None) => FrameGoal::Performed(function.clone()),
+        ("state", None, Some(predicate)) => FrameGoal::State(predicate.clone(), holds),
+        ("find", None, None) => FrameGoal::Find,
+        ("await", None, None) => FrameGoal::Await,
+        ("nothing", None, None) => FrameGoal::Nothing,
         _ => {
             return Err(wrong(
-                "needs one of the goals at, exchange, holding, performed, state, find, await, nothing; `performed` names a `function`, `state` a `predicate`, `find` what it does `vary`, and no other does",
+                "needs one of the goals at, exchange, holding, performed, state, find, await, nothing; `performed` names a `function`, `state` a `predicate`, and no other does",
             ));
         }
     };
-    let read =
-        |raw: &RawForm| Ok(FrameForm { form: form("verbs.toml", &raw.form)?, history: raw.history, times: raw.times });
+    if raw.forms.iter().any(|form| form.vary.is_some() != (goal == FrameGoal::Find)) {
+        return Err(wrong("has forms that say what they `vary` exactly if its goal is find"));
+    }
+    let read = |raw: &RawForm| {
+        let particle = raw.form.replace("{particle}", sense.particle.as_deref().unwrap_or("{particle}"));
+        let text = particle.replace("{with}", sense.with.as_deref().unwrap_or("{with}"));
+        let form = form("verbs.toml", &text)?;
+        Ok(FrameForm { form, history: raw.history, times: raw.times, vary: raw.vary, needs_sign: raw.needs_sign })
+    };
     let forms = raw.forms.iter().map(read).collect::<Result<_, _>>()?;
     Ok(Frame {
         name: raw.name.clone(),
         goal,
         said_of_object: raw.said_of_object,
         tool_state: raw.tool_state.clone(),
-        into: raw.into.clone(),
-        into_any: raw.into_any,
-        needs_sign: raw.needs_sign,
+        into: sense.into.clone(),
+        into_any: sense.into_any,
         forms,
     })
 }
 
-fn verb_forms(raw: &RawVerbs) -> BTreeMap<String, Vec<usize>> {
+fn verb_forms(
+    senses: &[(&RawFrame, RawSense)],
+    irregular: &BTreeMap<String, Vec<String>>,
+) -> BTreeMap<String, Vec<usize>> {
     let mut verbs: BTreeMap<String, Vec<usize>> = BTreeMap::new();
-    for (index, frame) in raw.frame.iter().enumerate() {
-        for verb in &frame.verbs {
-            let irregular = raw.irregular.get(verb).cloned().unwrap_or_default();
+    for (index, (_, sense)) in senses.iter().enumerate() {
+        for verb in &sense.verbs {
+            let irregular = irregular.get(verb).cloned().unwrap_or_default();
             for form in inflections(verb).into_iter().chain(irregular) {
                 let frames = verbs.entry(form).or_default();
                 if !frames.contains(&index) {
@@ -566,6 +613,8 @@ fn known_words(lexicon: &Lexicon) -> BTreeSet<String> {
         &w.otherwise,
         &w.once_markers,
         &w.there,
+        &w.whereabouts,
+        &w.above,
     ];
     let classes = closed.into_iter().flatten();
     let directions = lexicon.directions.iter().flat_map(|(_, forms)| forms);

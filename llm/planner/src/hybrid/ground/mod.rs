@@ -68,7 +68,15 @@ impl<'a> Grounding<'a> {
         };
         settle_subtasks(&subtasks, &mut references);
         let nouns = nouns_of(&references, self.library);
-        Ok(Task { instruction: self.text.into(), subtasks, references, untouched: form.untouched, nouns, manners })
+        Ok(Task {
+            instruction: self.text.into(),
+            subtasks,
+            references,
+            untouched: form.untouched,
+            nouns,
+            manners,
+            corrections: Vec::new(),
+        })
     }
 
     fn fault(&mut self, place: &str, reason: impl Into<String>) {

@@ -8,7 +8,7 @@ use crate::{
         syntax::{Clause, Modifier, PlaceKind, Statement},
     },
     lexicon::{FrameGoal, ModifierKind},
-    task::{Condition, Goal},
+    task::{Condition, Goal, Variation},
 };
 
 impl Interpretation<'_> {
@@ -100,7 +100,7 @@ impl Interpretation<'_> {
     }
 
     /// A goal with what is tried: the group named last that can be moved, and what it belongs in.
-    pub(super) fn trial(&mut self, clause: &Clause, vary: crate::task::Variation) -> Result<Goal, ParseError> {
+    pub(super) fn trial(&mut self, clause: &Clause, vary: Variation) -> Result<Goal, ParseError> {
         let moved = Role::Effect("at".into());
         let members = match &clause.object {
             Some(phrase) if phrase.pronoun.is_some() || phrase.elided => self.reference(phrase, &moved)?,
@@ -114,7 +114,7 @@ impl Interpretation<'_> {
         };
         let within = match &clause.place {
             Some(place) => Some(self.destination(place, None)?),
-            None if vary == crate::task::Variation::Heading => self.holder_named(members),
+            None if vary == Variation::Heading => self.holder_named(members),
             None => None,
         };
         let until = clause.modifier(ModifierKind::Until).and_then(|until| until.condition.as_ref());

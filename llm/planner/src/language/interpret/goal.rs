@@ -8,7 +8,7 @@ use crate::{
         syntax::{Clause, Modifier, NounPhrase, PlaceKind, PlacePhrase, Pronoun, Relation},
     },
     lexicon::{FrameGoal, ModifierKind},
-    task::{Destination, Goal, ObjectReference, Ordering, Quantity, ReferenceIndex, Span, Times},
+    task::{Destination, Goal, ObjectReference, Ordering, Quantity, ReferenceIndex, Span, Times, Variation},
 };
 
 impl Interpretation<'_> {
@@ -16,7 +16,18 @@ impl Interpretation<'_> {
     pub(super) fn goals(&mut self, clause: &Clause) -> Result<Vec<Goal>, ParseError> {
         match &clause.goal {
             FrameGoal::Exchange => return self.exchange(clause),
-            FrameGoal::Find(vary) => return Ok(vec![self.trial(clause, *vary)?]),
+            FrameGoal::Find => {
+                let vary = self.form_of(clause).and_then(|form| form.vary);
+                let vary = vary.ok_or_else(|| self.unsupported(clause.span, "it does not say what is to be tried"))?;
+                return Ok(vec![self.trial(clause, vary)?]);
+            }
+            // "Put them in, either way round, until the needle moves".
+            FrameGoal::At
+                if clause.modifier(ModifierKind::MayTurn).is_some()
+                    && clause.modifier(ModifierKind::Until).is_some() =>
+            {
+                return Ok(vec![self.trial(clause, Variation::Heading)?]);
+            }
             FrameGoal::Await => {
                 let statement = clause.condition.as_ref();
                 let statement = statement.ok_or_else(|| self.unsupported(clause.span, "it does not say for what"))?;
@@ -32,7 +43,7 @@ impl Interpretation<'_> {
             return Ok(vec![goal]);
         }
         let objects = self.objects(clause)?;
-        let named = clause.modifier(ModifierKind::ThatOrder);
+        let named = clause.as_named();
         if let (Some(_), [first, _, ..]) = (named, objects.as_slice())
             && let Some(members) = self.group_like(*first)
         {
@@ -60,11 +71,11 @@ impl Interpretation<'_> {
         let mut goals = Vec::new();
         for object in objects {
             let body = self.body(clause, object)?;
-            let side = clause.modifier(ModifierKind::From).and_then(|modifier| modifier.side);
+            let side = clause.from_side();
             if self.quantity_several(object) {
-                let order = side.map_or(Ordering::Any, Ordering::From);
+                let order = side.map_or(Ordering::Any, |(_, side)| Ordering::From(side));
                 goals.push(Goal::Each { members: object, order, body });
-            } else if let Some(modifier) = clause.modifier(ModifierKind::From) {
+            } else if let Some((modifier, _)) = side {
                 return Err(self.unsupported(modifier.span, "one thing has no order"));
             } else {
                 goals.extend(body);
@@ -94,6 +105,9 @@ impl Interpretation<'_> {
     fn objects(&mut self, clause: &Clause) -> Result<Vec<ReferenceIndex>, ParseError> {
         let role = Self::role_of(clause);
         let Some(first) = &clause.object else {
+            if let Some(carrier) = self.carrier_filled(clause) {
+                return Ok(vec![carrier]);
+            }
             if clause.tool.is_some()
                 && let Some(covered) = self.covered_before()
             {
@@ -108,7 +122,9 @@ impl Interpretation<'_> {
         };
         let mut objects = Vec::new();
         for phrase in std::iter::once(first).chain(&clause.also) {
-            if phrase.pronoun == Some(super::super::syntax::Pronoun::Several) {
+            // "Put the fork in the mug, move both": nothing of several has been named.
+            let both = phrase.elided && phrase.noun.is_none() && phrase.each && self.noun_before(&role, true).is_none();
+            if phrase.pronoun == Some(Pronoun::Several) || both {
                 objects.extend(self.antecedents(phrase.span, &role)?);
             } else if let Some(carrier) = self.carrier_meant(phrase, clause) {
                 objects.push(carrier);
@@ -121,9 +137,15 @@ impl Interpretation<'_> {
 
     /// "Put the fork in the mug and put it on the table": what was filled goes on with what is in it.
     fn carrier_meant(&self, phrase: &NounPhrase, clause: &Clause) -> Option<ReferenceIndex> {
+        phrase.pronoun?;
+        self.carrier_filled(clause)
+    }
+
+    /// What the clause before has put something into, where this one moves on what is not named.
+    fn carrier_filled(&self, clause: &Clause) -> Option<ReferenceIndex> {
         let history =
             matches!(clause.place, Some(PlacePhrase { kind: PlaceKind::History(..), .. })) || clause.place.is_none();
-        if phrase.pronoun.is_none() || history || clause.goal != FrameGoal::At {
+        if history || clause.goal != FrameGoal::At {
             return None;
         }
         match &self.drafts.last()?.subtask.goal {
@@ -234,6 +256,12 @@ impl Interpretation<'_> {
         if let Some(modifier) = clause.modifier(ModifierKind::Shown)
             && let Some(thing) = &modifier.thing
         {
+            // "the right one says", after "the left card says".
+            let mut thing = thing.clone();
+            if thing.elided && thing.noun.is_none() {
+                thing.noun = self.noun_that_showed();
+            }
+            let thing = &thing;
             return Ok(Times::Shown(self.reference(thing, &Role::Mentioned)?));
         }
         if let Some(modifier) = clause.modifier(ModifierKind::Until)
@@ -244,47 +272,13 @@ impl Interpretation<'_> {
         Ok(Times::Count(clause.times.unwrap_or(1)))
     }
 
-    /// "Swap the cube and the can": each goes to where the other stood. "Swap the two cubes": one and the other.
-    fn exchange(&mut self, clause: &Clause) -> Result<Vec<Goal>, ParseError> {
-        let role = Role::Effect("at".into());
-        let heading = clause.modifier(ModifierKind::TakesHeading).is_some();
-        let (one, other) = match (&clause.object, &clause.place) {
-            (Some(object), Some(PlacePhrase { kind: PlaceKind::At(other, _), .. })) => {
-                (self.reference(object, &role)?, self.reference(other, &role)?)
-            }
-            (None, Some(PlacePhrase { kind: PlaceKind::At(other, _), .. })) => {
-                (self.antecedent(clause.span, &role)?, self.reference(other, &role)?)
-            }
-            (Some(object), None) => match clause.also.as_slice() {
-                [] => self.two_of_a_group(object, &role)?,
-                [other] => (self.reference(object, &role)?, self.reference(other, &role)?),
-                _ => return Err(self.unsupported(clause.span, "two things change places, no more")),
-            },
-            _ => return Err(self.unsupported(clause.span, "it does not say with what")),
-        };
-        let group = |index: ReferenceIndex| self.references.get(index).is_some_and(several);
-        if one == other || group(one) || group(other) {
-            return Err(self.unsupported(clause.span, "two things that can be told apart change places, no more"));
-        }
-        let goal =
-            |object, with, first| Goal::At { object, destination: Destination::Exchanged { with, first, heading } };
-        Ok(vec![goal(one, other, true), goal(other, one, false)])
-    }
-
-    /// Any one of a group of two, and the other.
-    fn two_of_a_group(
-        &mut self,
-        phrase: &NounPhrase,
-        role: &Role,
-    ) -> Result<(ReferenceIndex, ReferenceIndex), ParseError> {
-        if !phrase.several() || phrase.pronoun.is_some() {
-            return Err(self.unsupported(phrase.span, "it does not say with what"));
-        }
-        let one = NounPhrase { quantity: Quantity::AnyOne, each: false, ..phrase.clone() };
-        let one = self.reference(&one, role)?;
-        let other = NounPhrase { quantity: Quantity::TheOne, each: false, other: true, ..phrase.clone() };
-        let other = self.fresh(&other, role, vec![one])?;
-        Ok((one, other))
+    /// The noun of what showed last how often something is to be done.
+    fn noun_that_showed(&self) -> Option<String> {
+        let shown = self.drafts.iter().rev().find_map(|draft| match &draft.subtask.goal {
+            Goal::Performed { times: Times::Shown(thing), .. } => Some(*thing),
+            _ => None,
+        });
+        self.references.get(shown?)?.noun.clone()
     }
 
     /// "parking each lid behind its cube" after something was done with each cube: it is done in the same turn, with
@@ -367,24 +361,10 @@ impl Interpretation<'_> {
         // Named, so that "them" and "each lid" have something to mean.
         self.reference(object, &Role::Affordance(COVERING))?;
         let members = self.reference(under, &Role::Mentioned)?;
-        let order = clause.modifier(ModifierKind::From).and_then(|modifier| modifier.side);
+        let order = clause.from_side().map(|(_, side)| side);
         let covered = Goal::State { predicate: "covered".into(), object: members, holds: true, by: None };
         let order = order.map_or(Ordering::Any, Ordering::From);
         Ok(Some(Goal::Each { members, order, body: vec![covered] }))
-    }
-
-    /// "Put each piece where the other one was": the two change places.
-    fn each_others_place(&mut self, clause: &Clause) -> Result<Option<Vec<Goal>>, ParseError> {
-        let (FrameGoal::At, Some(object), Some(PlacePhrase { kind: PlaceKind::History(Some(owner), _), .. })) =
-            (&clause.goal, &clause.object, &clause.place)
-        else {
-            return Ok(None);
-        };
-        if !(object.several() && owner.other && (owner.noun.is_none() || owner.noun == object.noun)) {
-            return Ok(None);
-        }
-        let both = Clause { goal: FrameGoal::Exchange, place: None, ..clause.clone() };
-        self.exchange(&both).map(Some)
     }
 
     /// "Carry each cube to the mat and back": what is said of the one whose turn it is belongs to its turn.
@@ -404,7 +384,7 @@ impl Interpretation<'_> {
             return Ok(false);
         }
         let mut goals = self.body(clause, members)?;
-        let side = clause.modifier(ModifierKind::From).and_then(|modifier| modifier.side);
+        let side = clause.from_side().map(|(_, side)| side);
         if let Some(draft) = self.drafts.last_mut()
             && let Goal::Each { body, order, .. } = &mut draft.subtask.goal
         {

@@ -1,6 +1,7 @@
 //! From phrases to goals: references are joined, pronouns find what they stand for, clauses get their order.
 
 mod condition;
+mod exchange;
 mod goal;
 mod place;
 mod reference;
@@ -11,7 +12,7 @@ use super::{
     syntax::{Clause, Guard, Modifier, NounPhrase, Order, Sentence},
 };
 use crate::{
-    lexicon::{FrameGoal, Lexicon, ModifierKind},
+    lexicon::{FrameForm, FrameGoal, Lexicon, ModifierKind},
     task::{
         Condition, Destination, Direction, Goal, Manner, MannerKind, ObjectReference, Ordering, Rank, ReferenceIndex,
         Span, Subtask, Task, Times,
@@ -53,7 +54,7 @@ pub(super) fn interpret(
     let subtasks = judged_together(drafts);
     settle_subtasks(&subtasks, &mut references);
     let nouns = nouns_of(&references, library);
-    Ok(Task { instruction: text.into(), subtasks, references, untouched, nouns, manners })
+    Ok(Task { instruction: text.into(), subtasks, references, untouched, nouns, manners, corrections: Vec::new() })
 }
 
 /// A subtask with the number of the "if" on which it hangs.
@@ -100,6 +101,7 @@ impl Interpretation<'_> {
             return Ok(());
         }
         let goals = self.goals(clause)?;
+        self.check_repeated(clause, &goals)?;
         if let (
             [Goal::Find { members, vary, .. }],
             Some(Goal::Find { members: before, vary: known, probe: None, sign: None, .. }),
@@ -116,7 +118,7 @@ impl Interpretation<'_> {
         }
         let at = self.place_in_order(order);
         let guard = guard.map(|guard| guard.number);
-        let needs_sign = self.lexicon.frames.get(clause.frame).is_some_and(|frame| frame.needs_sign);
+        let needs_sign = self.form_of(clause).is_some_and(|form| form.needs_sign);
         let each = clause.object.as_ref().is_some_and(|object| object.each || object.several());
         let drafts = goals.into_iter().map(|goal| {
             let subtask = Subtask { when: when.clone(), ..self.subtask(clause.span, goal) };
@@ -129,6 +131,22 @@ impl Interpretation<'_> {
             self.manner_of(modifier)?;
         }
         Ok(())
+    }
+
+    /// Refuses "until", "as often as" and "either way round" of what is not done again and again: nothing said is passed over.
+    fn check_repeated(&self, clause: &Clause, goals: &[Goal]) -> Result<(), ParseError> {
+        let repeats = [ModifierKind::Until, ModifierKind::Shown, ModifierKind::MayTurn, ModifierKind::EachTry];
+        match clause.modifiers.iter().find(|modifier| repeats.contains(&modifier.kind)) {
+            Some(modifier) if !goals.iter().any(repeated) => {
+                Err(self.unsupported(modifier.span, "what it is said of is done once and not again and again"))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// The form of its frame in which a clause was read.
+    fn form_of(&self, clause: &Clause) -> Option<&FrameForm> {
+        self.lexicon.frames.get(clause.frame)?.forms.get(clause.form)
     }
 
     fn subtask(&self, span: Span, goal: Goal) -> Subtask {
@@ -159,11 +177,9 @@ impl Interpretation<'_> {
     fn manner(&mut self, modifier: &Modifier) -> Result<(), ParseError> {
         let last = self.drafts.last_mut().map(|draft| &mut draft.subtask.goal);
         match (modifier.kind, last) {
-            (ModifierKind::TakesHeading, Some(_)) => self.take_heading(modifier.span),
-            (ModifierKind::From, Some(Goal::Each { order: order @ Ordering::Any, .. })) => {
-                if let Some(side) = modifier.side {
-                    *order = Ordering::From(side);
-                }
+            (ModifierKind::TakesPlace, Some(_)) if modifier.heading => self.take_heading(modifier.span),
+            (ModifierKind::Order, Some(Goal::Each { order: order @ Ordering::Any, .. })) if modifier.side.is_some() => {
+                *order = modifier.side.map_or(Ordering::Any, Ordering::From);
                 Ok(())
             }
             (ModifierKind::MayTurn, Some(Goal::Find { vary: crate::task::Variation::Heading, .. })) => Ok(()),
@@ -191,7 +207,7 @@ impl Interpretation<'_> {
                 }
                 None => return Ok(()),
             },
-            ModifierKind::TakesHeading => return self.take_heading(modifier.span),
+            ModifierKind::TakesPlace if modifier.heading => return self.take_heading(modifier.span),
             _ => return Ok(()),
         };
         self.manners.push(Manner { span: modifier.span, kind });
@@ -312,6 +328,15 @@ impl Interpretation<'_> {
             kept.push(draft);
         }
         self.drafts = kept;
+    }
+}
+
+/// Whether a goal is one that is tried, or done a number of times.
+fn repeated(goal: &Goal) -> bool {
+    match goal {
+        Goal::Performed { .. } | Goal::Find { .. } => true,
+        Goal::Each { body, .. } => body.iter().any(repeated),
+        _ => false,
     }
 }
 
