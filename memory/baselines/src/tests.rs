@@ -27,7 +27,7 @@ fn scene(block: Option<(f64, f64)>) -> Vec<Thing> {
 }
 
 fn method(name: &str) -> Box<dyn Memory> {
-    let mut memory = by_name(name, Arc::clone(&LIBRARY), None).unwrap();
+    let mut memory = by_name(name, Arc::clone(&LIBRARY), None, None).unwrap();
     begin(&mut *memory).unwrap();
     memory
 }
@@ -66,9 +66,9 @@ fn names_lead_to_methods_of_that_name() {
     for name in METHODS {
         assert_eq!(method(name).name(), name);
     }
-    let error = by_name("frist-frame", Arc::clone(&LIBRARY), None).err().unwrap().to_string();
+    let error = by_name("frist-frame", Arc::clone(&LIBRARY), None, None).err().unwrap().to_string();
     assert!(error.contains("did you mean `first-frame`") && error.contains("paper-identity"), "{error}");
-    assert!(!by_name("xyz", Arc::clone(&LIBRARY), None).err().unwrap().to_string().contains("did you mean"));
+    assert!(!by_name("xyz", Arc::clone(&LIBRARY), None, None).err().unwrap().to_string().contains("did you mean"));
 }
 
 #[test]
