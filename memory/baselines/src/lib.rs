@@ -19,6 +19,7 @@
 //! What the hand feels and how far the instruction is done is the same for all of them. But for the first two and the last
 //! one, what a method does not keep is dropped after every call ([`Pruned`]), so that nothing later can rest on it.
 
+mod first_frame;
 mod full_history;
 mod keeping;
 mod method;

@@ -8,6 +8,7 @@ use crate::{
 use acm_concept::{
     ids::{FrameId, ObjectId, TransitionId},
     template::TemplateLibrary,
+    time::Time,
 };
 use acm_memory::{
     entry::{HistoryEntry, Moment, PlaceCause, Presence, Transition},
@@ -92,7 +93,8 @@ pub(crate) struct Reach<'a> {
     pub window: Option<Moment>,
     /// What the last frame showed, and what is in the hand.
     pub present: &'a [ObjectId],
-    /// Whether the last thing that happened was a frame: only that tells what is out of sight.
+    /// Whether the last thing that happened was a frame: only that tells what is out of sight; what a deed left somewhere is
+    /// still before its eyes.
     pub looked: bool,
 }
 
@@ -117,7 +119,7 @@ pub(crate) fn prune(mut content: Content, reach: &Reach<'_>, library: &TemplateL
         (rest.regrouped, rest.regroupings) = (Vec::new(), 0);
     }
     if reach.keeping.in_words {
-        words::put(&mut content, reach.present, library);
+        words::put(&mut content, |id| !reach.looked || reach.present.contains(&id), library);
     }
     content.into_events()
 }
@@ -160,27 +162,42 @@ fn history_left(
     let ends: Vec<Option<Moment>> = history.iter().skip(1).map(|next| Some(next.moment)).chain([None]).collect();
     let taken_by: Vec<Option<TransitionId>> = history.iter().skip(1).map(grasped_by).chain([None]).collect();
     let logs = reach.keeping.deeds != Deeds::Last;
-    let left = history.into_iter().zip(ends).zip(taken_by).filter_map(|((entry, end), taken_by)| {
+    let mut left: Vec<HistoryEntry> = Vec::new();
+    for ((entry, end), taken_by) in history.into_iter().zip(ends).zip(taken_by) {
         let own = matches!(entry.cause, PlaceCause::Own(deed) | PlaceCause::Grasped(deed) if deeds.contains(&deed));
-        if own && logs {
-            return Some(entry);
-        }
-        if let Some(sight) = shown_in(&entry, end, id, reach) {
-            return Some(restamped(entry, sight));
-        }
-        // A deed tells whence it took the thing.
         let deed = taken_by.filter(|deed| logs && deeds.contains(deed));
-        if let Some(transition) = deed.and_then(|deed| transitions.iter().find(|transition| transition.id == deed)) {
-            let moment = Moment { time: transition.report.started, ..transition.moment };
-            return Some(HistoryEntry {
-                moment: moment.max(entry.moment),
-                cause: PlaceCause::Grasped(transition.id),
-                ..entry
-            });
+        let deed = deed.and_then(|deed| transitions.iter().find(|transition| transition.id == deed));
+        // Since when is known from a kept frame alone. What is not known to have changed is taken to have been so.
+        let since = left.last().map_or(Moment { time: Time::ZERO, ..entry.moment }, |before| just_after(before.moment));
+        let since = since.min(entry.moment);
+        match shown_in(&entry, end, id, reach) {
+            _ if own && logs => left.push(entry),
+            Some(sight) if frame_of(&entry) == Some(sight.frame) => left.push(entry),
+            Some(sight) => {
+                let cause = if entry.place.is_some() { PlaceCause::Seen } else { PlaceCause::Gone };
+                left.push(HistoryEntry { moment: since, cause: cause(sight.frame), ..entry });
+            }
+            // A deed tells whence it took the thing.
+            None if deed.is_some() => {
+                let cause = deed.map_or(entry.cause, |deed| PlaceCause::Grasped(deed.id));
+                left.push(HistoryEntry { moment: since, cause, ..entry });
+            }
+            None if end.is_none() => left.push(HistoryEntry { moment: since, ..entry }),
+            None => {}
         }
-        end.is_none().then_some(entry)
-    });
-    left.collect()
+    }
+    left
+}
+
+fn just_after(moment: Moment) -> Moment {
+    Moment { time: Time(moment.time.0 + 1), ..moment }
+}
+
+fn frame_of(entry: &HistoryEntry) -> Option<FrameId> {
+    match entry.cause {
+        PlaceCause::Seen(frame) | PlaceCause::Gone(frame) => Some(frame),
+        PlaceCause::Own(_) | PlaceCause::Grasped(_) => None,
+    }
 }
 
 fn grasped_by(entry: &HistoryEntry) -> Option<TransitionId> {
@@ -192,24 +209,11 @@ fn grasped_by(entry: &HistoryEntry) -> Option<TransitionId> {
 
 /// The first kept frame that shows an entry to be so.
 fn shown_in<'a>(entry: &HistoryEntry, end: Option<Moment>, id: ObjectId, reach: &Reach<'a>) -> Option<&'a Sight> {
-    let frame = match entry.cause {
-        PlaceCause::Seen(frame) | PlaceCause::Gone(frame) => Some(frame),
-        PlaceCause::Own(_) | PlaceCause::Grasped(_) => None,
-    };
+    let frame = frame_of(entry);
     let shows = |sight: &Sight| match entry.place {
         Some(_) => sight.shown.contains_key(&id),
         None => sight.gone.contains(&id),
     };
     let during = |sight: &Sight| sight.moment >= entry.moment && end.is_none_or(|end| sight.moment < end);
     reach.kept.iter().copied().find(|sight| shows(sight) && (Some(sight.frame) == frame || during(sight)))
-}
-
-/// The entry as the frame tells it.
-fn restamped(entry: HistoryEntry, sight: &Sight) -> HistoryEntry {
-    let cause = match (entry.cause, entry.place) {
-        (PlaceCause::Seen(frame) | PlaceCause::Gone(frame), _) if frame == sight.frame => return entry,
-        (_, Some(_)) => PlaceCause::Seen(sight.frame),
-        (_, None) => PlaceCause::Gone(sight.frame),
-    };
-    HistoryEntry { moment: sight.moment.max(entry.moment), cause, ..entry }
 }

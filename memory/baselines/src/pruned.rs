@@ -1,6 +1,7 @@
 //! A memory that keeps less than everything.
 
 use crate::{
+    first_frame::FirstFrame,
     keeping::{Frames, Keeping},
     prune::{self, Content},
     sights::{Sight, Sights, looks},
@@ -8,7 +9,7 @@ use crate::{
 use acm_concept::{expectation::Expectation, ids::TransitionId, template::TemplateLibrary, time::Time};
 use acm_memory::{
     AcmMemory, Memory, MemoryError, MemoryView, Snapshot,
-    event::Event,
+    event::{Believed, Event},
     observation::{Executed, Grounding, Note, Observation, Outcome, Verdict},
 };
 use std::sync::Arc;
@@ -103,7 +104,8 @@ impl Memory for Pruned {
     }
     fn observe(&mut self, observation: &Observation<'_>) -> Result<Grounding, MemoryError> {
         let grounding = self.memory.observe(observation)?;
-        if observation.percepts.blindness.is_none() {
+        // A run's first frame is the first one that shows something.
+        if observation.percepts.blindness.is_none() || self.taken > 0 {
             self.remember(observation, &grounding);
         }
         self.drop_rest(true)?;
@@ -139,6 +141,15 @@ impl Memory for Pruned {
         self.memory.wipe()
     }
     fn view(&self) -> Arc<dyn MemoryView> {
-        Arc::new(self.read.clone().unwrap_or_else(|| self.snapshot()))
+        let now = self.read.clone().unwrap_or_else(|| self.snapshot());
+        let kept = self.sights.kept();
+        match kept.first().filter(|sight| self.keeping.frames == Frames::First && sight.number == 0) {
+            Some(first) => {
+                let place = |believed: &Believed| Some((believed.entry.id, believed.entry.place()?));
+                let places = first.shown.values().filter_map(place).collect();
+                Arc::new(FirstFrame::new(now, first.frame, places))
+            }
+            None => Arc::new(now),
+        }
     }
 }
