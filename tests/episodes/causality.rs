@@ -24,6 +24,35 @@ fn without_sight_every_task_ends_in_a_give_up() {
     }
 }
 
+/// The run begins anew with what is to be seen then: the gap is empty, or the colours are under their lids.
+#[test]
+fn without_its_past_a_task_in_the_middle_ends_in_a_give_up() {
+    for (task, event, unknown_thing) in [
+        ("rearrange-blocks", "first-verified-place", "no cube standing in the gap"),
+        ("rearrange-blocks", "first-verified-press", "no cube standing in the gap"),
+        ("cover-blocks", "first-verified-place", "no red"),
+    ] {
+        let whole = run(task, 1, &[], |_| {});
+        assert!(whole.solved, "{task} is solved with its past: {}", whole.verdict.explanation);
+        let wiped = run(task, 1, &[&format!("wipe-memory@{event}")], |_| {});
+        assert!(unknown(&wiped).contains(unknown_thing), "{task} after {event}: {}", unknown(&wiped));
+    }
+}
+
+/// One of four mats is the right one: five draws do not all hit it.
+#[test]
+fn without_its_past_a_guess_is_no_better_than_chance() {
+    let guess = |seed| {
+        run("put-back-block", seed, &["wipe-memory@first-verified-place"], |config| {
+            config.settings.on_unknown = OnUnknown::Guess;
+        })
+    };
+    let results: Vec<EpisodeResult> = (0..5).map(guess).collect();
+    assert!(results.iter().all(|result| result.report.steps.iter().any(|step| step.guessed)), "nothing was guessed");
+    let solved = results.iter().filter(|result| result.solved).count();
+    assert!(solved < results.len(), "{solved} of {} guesses were right", results.len());
+}
+
 /// Runs an episode and tells where a thing was at the beginning and where it ended, in truth.
 fn carried(seed: u64, faults: &[&str], memory: Option<&Path>, thing: &str) -> (EpisodeResult, DVec3, DVec3) {
     let injections: Vec<Injection> = faults.iter().map(|fault| fault.parse().unwrap()).collect();
