@@ -14,7 +14,7 @@ use std::{fmt, sync::Arc};
 /// Perception of a stored frame: the frame, what the arm reported when it was taken, and what is expected.
 pub type Perceive = Arc<dyn Fn(&RgbdFrame, &Feedback, &Expectation) -> Percepts + Send + Sync>;
 
-/// Keeps all frames and what they showed, but of its own deeds the last one alone. When an instruction is given, the frames
+/// Keeps all frames and what they showed, and all deeds, which a film of the whole run would show too. When an instruction is given, the frames
 /// before it are perceived again with its words; those that follow are perceived with them at once, and perceiving them
 /// again would give the same. Once something was done, frames are no longer perceived anew: things have their names by then.
 pub struct FullHistory {

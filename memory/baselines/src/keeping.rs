@@ -42,10 +42,20 @@ pub(crate) enum Frames {
 pub(crate) enum Deeds {
     /// The last one.
     Last,
+    /// The last one, and of the present subtask what was dealt with: the last deed of each kind with each thing, not where it
+    /// was nor how often.
+    Progress,
     /// Those since the first frame of the window.
     Window,
     /// All.
     All,
+}
+
+impl Deeds {
+    /// Whether a deed is kept with the places that it tells of.
+    pub fn tell_places(self) -> bool {
+        matches!(self, Deeds::Window | Deeds::All)
+    }
 }
 
 const fn keeping(name: &'static str, frames: Frames, deeds: Deeds) -> Keeping {
@@ -55,14 +65,14 @@ const fn keeping(name: &'static str, frames: Frames, deeds: Deeds) -> Keeping {
 /// The methods that are told apart by what they keep.
 pub(crate) const KEEPINGS: [Keeping; 8] = [
     keeping("reactive", Frames::Last, Deeds::Last),
-    keeping("first-frame", Frames::First, Deeds::Last),
+    keeping("first-frame", Frames::First, Deeds::Progress),
     keeping("window", Frames::Recent(RECENT), Deeds::Window),
     keeping("action-log", Frames::Last, Deeds::All),
     keeping("keyframe", Frames::Key { recent: RECENT, most: RECENT }, Deeds::Window),
-    keeping("embedding", Frames::Bank { most: BANK, read: RECENT }, Deeds::Last),
+    keeping("embedding", Frames::Bank { most: BANK, read: RECENT }, Deeds::Progress),
     Keeping { in_words: true, ..keeping("text-summary", Frames::All, Deeds::All) },
-    Keeping { last_places: true, ..keeping("semantic", Frames::Last, Deeds::Last) },
+    Keeping { last_places: true, ..keeping("semantic", Frames::Last, Deeds::Progress) },
 ];
 
 /// What `full-history` keeps.
-pub(crate) const FULL_HISTORY: Keeping = keeping("full-history", Frames::All, Deeds::Last);
+pub(crate) const FULL_HISTORY: Keeping = keeping("full-history", Frames::All, Deeds::All);

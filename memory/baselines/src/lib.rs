@@ -6,14 +6,14 @@
 //! | `acm` | everything: [`acm_memory::AcmMemory`] |
 //! | `paper-identity` | everything, with the paper's identity rule |
 //! | `reactive` | the last frame, the last deed |
-//! | `first-frame` | the same and the run's first frame |
+//! | `first-frame` | the last frame and the run's first one; what was dealt with in the present subtask |
 //! | `window` | the last frames and the deeds since the first of them |
 //! | `action-log` | the last frame and all own deeds, with what they tell of places |
 //! | `keyframe` | a short window, and key frames: nominated ones, clustered by their number |
-//! | `embedding` | the last frame and a bank of frames, of which those are read that look most like the present one |
+//! | `embedding` | the last frame and a bank of frames, of which those are read that look most like the present one; what was dealt with |
 //! | `text-summary` | everything, as far as short sentences can say it |
-//! | `semantic` | each thing's looks and last known place; no past, no deeds but the last |
-//! | `full-history` | all frames, perceived again once it is known what is asked for; no deeds but the last |
+//! | `semantic` | each thing's looks and last known place; what was dealt with |
+//! | `full-history` | all frames, perceived again once it is known what is asked for, and all deeds |
 //! | `shuffled` | everything, but each thing has another one's past |
 //!
 //! What the hand feels and how far the instruction is done is the same for all of them. But for the first two and the last

@@ -100,15 +100,8 @@ pub(crate) struct Reach<'a> {
 
 /// What is left as events.
 pub(crate) fn prune(mut content: Content, reach: &Reach<'_>, library: &TemplateLibrary) -> Vec<Event> {
-    let last = content.transitions.last().map(|transition| transition.id);
-    content.transitions.retain(|transition| {
-        Some(transition.id) == last
-            || match reach.keeping.deeds {
-                Deeds::Last => false,
-                Deeds::Window => reach.window.is_some_and(|began| transition.moment >= began),
-                Deeds::All => true,
-            }
-    });
+    let current = content.rest.as_ref().map_or(0, |rest| rest.progress.current());
+    content.transitions = deeds_left(content.transitions, reach, current);
     let deeds: BTreeSet<TransitionId> = content.transitions.iter().map(|transition| transition.id).collect();
     let transitions = &content.transitions;
     content.objects =
@@ -124,6 +117,29 @@ pub(crate) fn prune(mut content: Content, reach: &Reach<'_>, library: &TemplateL
     content.into_events()
 }
 
+/// The deeds that are left.
+fn deeds_left(deeds: Vec<Transition>, reach: &Reach<'_>, current: u32) -> Vec<Transition> {
+    let last = deeds.last().map(|deed| deed.id);
+    let mut seen: BTreeSet<(String, ObjectId)> = BTreeSet::new();
+    let mut left: Vec<Transition> = Vec::new();
+    for mut deed in deeds.into_iter().rev() {
+        let newest = seen.insert((deed.skill().to_owned(), deed.object()));
+        let kept = match reach.keeping.deeds {
+            _ if Some(deed.id) == last => true,
+            Deeds::Last => false,
+            Deeds::Progress => newest && deed.subtask == Some(current),
+            Deeds::Window => reach.window.is_some_and(|began| deed.moment >= began),
+            Deeds::All => true,
+        };
+        if kept && Some(deed.id) != last && !reach.keeping.deeds.tell_places() {
+            (deed.report.left_at, deed.report.invocation.destination) = (None, None);
+        }
+        left.extend(kept.then_some(deed));
+    }
+    left.reverse();
+    left
+}
+
 /// What is left of an object.
 fn object_left(
     object: Remembered,
@@ -134,11 +150,11 @@ fn object_left(
     let Remembered { mut believed, history } = object;
     let id = believed.entry.id;
     if reach.keeping.last_places {
-        return Some(Remembered { believed, history: history.into_iter().next_back().into_iter().collect() });
+        return Some(Remembered { believed, history: history_left(id, history, reach, deeds, transitions) });
     }
     let told_by = reach.kept.iter().rev().find(|sight| sight.tells_of(id));
     let left_there = |cause: &PlaceCause| matches!(cause, PlaceCause::Own(deed) if deeds.contains(deed));
-    let handled = reach.keeping.deeds != Deeds::Last && history.last().is_some_and(|last| left_there(&last.cause));
+    let handled = reach.keeping.deeds.tell_places() && history.last().is_some_and(|last| left_there(&last.cause));
     let mut history = history_left(id, history, reach, deeds, transitions);
     if reach.looked && !reach.present.contains(&id) && !handled {
         let sight = told_by?;
@@ -161,7 +177,7 @@ fn history_left(
 ) -> Vec<HistoryEntry> {
     let ends: Vec<Option<Moment>> = history.iter().skip(1).map(|next| Some(next.moment)).chain([None]).collect();
     let taken_by: Vec<Option<TransitionId>> = history.iter().skip(1).map(grasped_by).chain([None]).collect();
-    let logs = reach.keeping.deeds != Deeds::Last;
+    let logs = reach.keeping.deeds.tell_places();
     let mut left: Vec<HistoryEntry> = Vec::new();
     for ((entry, end), taken_by) in history.into_iter().zip(ends).zip(taken_by) {
         let own = matches!(entry.cause, PlaceCause::Own(deed) | PlaceCause::Grasped(deed) if deeds.contains(&deed));
