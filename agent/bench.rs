@@ -8,6 +8,7 @@
 //! | [`bddl`] | reads household activities and tabletop tasks of the outside data |
 //! | [`perception`] | real labelled frames, and the fixed rendered suite with its truth |
 //! | [`identity`] | twins in a row and household rooms seen twice |
+//! | [`rmbench`] | memories side by side on the tasks of RMBench |
 //! | [`planner`] | goals of published tasks, plans checked by a simulator of their own |
 //! | [`runtime`] | frames and messages from one to the other, the trace, restarts |
 //! | [`world`] | physics and pictures beside MuJoCo, grasps and primitives, pace, audit, snapshots |
@@ -18,11 +19,14 @@ pub mod identity;
 pub mod memory;
 pub mod perception;
 pub mod planner;
+pub mod rmbench;
 pub mod runtime;
 pub mod targets;
 pub mod world;
 
-use crate::cli::{AblationArgs, BenchArgs, BenchCommand, Exit, MemoryArgs, PerceptionArgs, PlannerArgs, WorldArgs};
+use crate::cli::{
+    AblationArgs, BenchArgs, BenchCommand, Exit, MemoryArgs, PerceptionArgs, PlannerArgs, RmbenchArgs, WorldArgs,
+};
 use anyhow::Context;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
@@ -155,6 +159,7 @@ pub fn run(command: &BenchCommand) -> anyhow::Result<Exit> {
     | BenchCommand::Identity(args)
     | BenchCommand::Planner(PlannerArgs { common: args, .. })
     | BenchCommand::Memory(MemoryArgs { common: args, .. })
+    | BenchCommand::Rmbench(RmbenchArgs { common: args, .. })
     | BenchCommand::Runtime(args)
     | BenchCommand::World(WorldArgs { common: args, .. })) = command;
     // First, so that a mistake in the file does not cost the measurement.
@@ -168,6 +173,7 @@ pub fn run(command: &BenchCommand) -> anyhow::Result<Exit> {
         BenchCommand::Identity(args) => identity::measure(args),
         BenchCommand::Planner(args) => planner::measure(args),
         BenchCommand::Memory(args) => memory::measure(args),
+        BenchCommand::Rmbench(args) => rmbench::measure(args),
         BenchCommand::Runtime(args) => runtime::measure(args),
         BenchCommand::World(args) => world::measure(args),
     };

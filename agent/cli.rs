@@ -7,7 +7,7 @@ pub mod trace;
 
 use crate::{
     bench,
-    bench::{perception::PerceptionPart, planner::PlannerPart, world::WorldPart},
+    bench::{perception::PerceptionPart, planner::PlannerPart, rmbench::Block, world::WorldPart},
     config, demo, doctor,
     inject::Injection,
     library,
@@ -225,7 +225,7 @@ pub struct RunArgs {
     /// A seed, or a range A..B that includes both ends.
     #[arg(long, default_value = "0")]
     pub seed: Seeds,
-    /// The memory: acm, paper-identity, reactive, first-frame.
+    /// The memory: acm, or another one to compare with, such as reactive (docs/rmbench.md lists them).
     #[arg(long, default_value = "acm")]
     pub method: String,
     /// What to do when memory cannot decide: abstain if neither this nor the configuration says.
@@ -480,6 +480,8 @@ pub enum BenchCommand {
     Planner(PlannerArgs),
     /// The engine under memory at 1e4, 1e5 and 1e6 objects: questions, commits, recovery, power failures, forgetting.
     Memory(MemoryArgs),
+    /// Memories side by side on the tasks of RMBench: two judges, intervals, one page. What was run is kept and gone on with.
+    Rmbench(RmbenchArgs),
     /// Frames between processes, messages between actors, what a trace costs, how fast an actor is replaced.
     Runtime(BenchArgs),
     /// Physics beside MuJoCo, grasps, primitives, rendering, pace, physics audit, snapshots.
@@ -533,6 +535,53 @@ pub struct AblationArgs {
     /// Leave out the model that errs.
     #[arg(long)]
     pub no_degradation: bool,
+}
+
+/// Arguments of `acm bench rmbench`.
+#[derive(Debug, Args)]
+pub struct RmbenchArgs {
+    /// What every bench takes; the episodes are those that this call runs at most, the others stay for the next one.
+    #[command(flatten)]
+    pub common: BenchArgs,
+    /// Where results and pictures are kept, and what is gone on with.
+    #[arg(long, value_name = "DIR", default_value = "out/rmbench")]
+    pub out: PathBuf,
+    /// Tasks; the nine that are scored if not given.
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
+    pub tasks: Vec<String>,
+    /// Memories (docs/rmbench.md); all if not given.
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
+    pub memories: Vec<String>,
+    /// What they do when they cannot decide.
+    #[arg(long, value_enum, value_delimiter = ',', default_value = "abstain,guess")]
+    pub on_unknown: Vec<OnUnknownArg>,
+    /// Blocks of seeds: development (from 0), published (from 100000), fresh (from --fresh-from).
+    #[arg(long, value_name = "BLOCK,...", value_enum, value_delimiter = ',', default_value = "published")]
+    pub blocks: Vec<Block>,
+    /// Seeds of each block; 100 if not given.
+    #[arg(long, value_name = "N")]
+    pub seeds: Option<u64>,
+    /// First seed of the fresh block.
+    #[arg(long, value_name = "N", default_value_t = 110_000)]
+    pub fresh_from: u64,
+    /// Also the jittered variant of every task.
+    #[arg(long)]
+    pub jittered: bool,
+    /// Also run acm on so many seeds of each task with frames that are all black.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub black_frames: u64,
+    /// Another robot than the tasks' own, such as dual-panda.
+    #[arg(long, value_name = "MODEL")]
+    pub robot: Option<String>,
+    /// Another sensor profile than the tasks' own: none, d435, d435-hard.
+    #[arg(long, value_name = "PROFILE")]
+    pub sensor: Option<String>,
+    /// Episodes at a time; as many as there are processors if not given.
+    #[arg(long, value_name = "N")]
+    pub workers: Option<usize>,
+    /// The page with all tables; page.html beside the results if not given.
+    #[arg(long, value_name = "FILE")]
+    pub html: Option<PathBuf>,
 }
 
 /// Arguments of `acm bench memory`.

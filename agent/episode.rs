@@ -18,9 +18,11 @@ use acm_actors::{
 };
 use acm_concept::{
     embodiment::{Command, Embodiment, EmbodimentError, Feedback, RobotDescription},
+    expectation::Expectation,
     task::TaskSpec,
     template::TemplateLibrary,
 };
+use acm_perception::Grounder;
 use acm_planner::{GiveUpCause, Lexicon};
 use acm_runtime::{envelope::Role, journal::Journal, system::PanicAt};
 use acm_sim::{AuditReport, OracleVerdict, Scenario, SharedRenderer, SimOptions, SimTimings, Simulation};
@@ -152,6 +154,16 @@ impl Runner {
     pub fn with_words(&self, library: TemplateLibrary, lexicon: Lexicon) -> anyhow::Result<Runner> {
         let other = Runner::without_renderer(library)?;
         Ok(Runner { renderer: self.renderer.clone(), lexicon: Some(lexicon), ..other })
+    }
+
+    /// Another one beside this: the same renderer and words, but a runtime and an interrupt of its own, so that two episodes
+    /// run at a time.
+    ///
+    /// # Errors
+    /// The runtime cannot be started.
+    pub fn beside(&self) -> anyhow::Result<Runner> {
+        let other = Runner::without_renderer((*self.library).clone())?;
+        Ok(Runner { renderer: self.renderer.clone(), lexicon: self.lexicon.clone(), ..other })
     }
 
     /// Ends the running episode when the process is interrupted from the keyboard.
@@ -315,7 +327,13 @@ impl Runner {
         journal: Arc<dyn Journal<Message>>,
         trace: Option<Arc<Trace>>,
     ) -> anyhow::Result<Lived> {
-        let memory = acm_baselines::by_name(&config.method, Arc::clone(&self.library), config.memory.as_deref())?;
+        let perceive = again(&self.library, &config.settings, outside.embodiment.description());
+        let memory = acm_baselines::by_name(
+            &config.method,
+            Arc::clone(&self.library),
+            config.memory.as_deref(),
+            Some(perceive),
+        )?;
         let donor = config.faults.transplant.as_ref().map(|(donor, _)| donor);
         let donated = donor.map(|donor| acm_memory::read_events(donor)).transpose()?.unwrap_or_default();
         let panic_at = config.panic_at.as_ref().or(config.faults.panic_at.as_ref());
@@ -355,6 +373,15 @@ impl Runner {
         }
         Ok(Lived { report: run.report, spent_s, commands: commands.load(Ordering::Relaxed) })
     }
+}
+
+/// Perception of stored frames, as the agent perceives them: for memories that keep frames.
+fn again(library: &Arc<TemplateLibrary>, settings: &Settings, robot: &RobotDescription) -> acm_baselines::Perceive {
+    let (grounder, robot) = (Grounder::new(Arc::clone(library), settings.perception.clone()), robot.clone());
+    Arc::new(move |frame, feedback, expectation| {
+        let expectation = Expectation { time: frame.header.time, robot: robot.body(feedback), ..expectation.clone() };
+        grounder.ground(frame, &expectation)
+    })
 }
 
 /// Runs an episode into a trace, where one is wanted.

@@ -79,7 +79,7 @@ pub(crate) fn prepare_with(args: &RunArgs, config: Config) -> anyhow::Result<(Ep
         None => acm_memory::whole_library()?,
     };
     // A misspelt method or a memory that cannot be opened must not cost the start of the renderer.
-    drop(acm_baselines::by_name(&config.method, Arc::new(library.clone()), config.memory.as_deref())?);
+    drop(acm_baselines::by_name(&config.method, Arc::new(library.clone()), config.memory.as_deref(), None)?);
     if let Some((donor, _)) = &config.faults.transplant {
         drop(acm_memory::read_events(donor)?);
     }

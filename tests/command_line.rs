@@ -27,6 +27,8 @@ mod perceive;
 mod real_frames;
 #[path = "command_line/replay.rs"]
 mod replay;
+#[path = "command_line/rmbench.rs"]
+mod rmbench;
 #[path = "command_line/synthetic.rs"]
 mod synthetic;
 #[path = "command_line/trace.rs"]

@@ -1,6 +1,9 @@
 //! Whole episodes, rendered and judged. Few seeds: the counts that matter are printed by `acm run A..B`.
 #![allow(clippy::unwrap_used, clippy::expect_used)] // a failed unwrap is the test's verdict
 
+#[path = "episodes/causality.rs"]
+mod causality;
+
 use acm::{
     episode::{EpisodeConfig, EpisodeResult, Runner},
     inject::{Faults, Injection},

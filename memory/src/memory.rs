@@ -173,6 +173,11 @@ impl AcmMemory {
     pub fn columns(&self) -> &Arc<acm_store::State> {
         self.ledger.columns()
     }
+    /// Events that add up to what is believed now, as a compacted log begins with them: for a memory that shall believe a
+    /// part of it, see [`Memory::transplant`].
+    pub fn digest(&self) -> Vec<Event> {
+        forgetting::digest(&self.state)
+    }
     /// The present view, with what only this memory can be asked.
     pub fn snapshot(&self) -> Snapshot {
         Snapshot::new(self.state.clone(), self.library.clone(), self.ledger.columns().clone())

@@ -1,68 +1,80 @@
-//! The last frame, and the first.
+//! The view of a memory that keeps the run's first frame.
 
-use crate::{Reactive, last_frame::LastFrame};
-use acm_concept::{expectation::Expectation, ids::TransitionId, template::TemplateLibrary, time::Time};
-use acm_memory::{
-    Memory, MemoryError, MemoryView, Recent,
-    entry::ObjectEntry,
-    observation::{Executed, Grounding, Note, Observation, Verdict},
+use acm_concept::{
+    ids::{FrameId, ObjectId},
+    literal::{Belief, Evidence, Literal, Place},
+    object::SupportPlane,
+    template::TemplateLibrary,
 };
-use std::sync::Arc;
+use acm_memory::{
+    MemoryView, Snapshot,
+    entry::{ObjectEntry, SkillEntry, TaskProgress, Transition},
+    query::{ObjectQuery, PlaceReference, Prediction, Recall, Retrieval, SkillCandidate},
+};
 
-/// [`Reactive`] with the objects of the run's first frame beside it, kept as they were seen. Where something was
-/// before is where the first frame shows what looks like it, moved since or not.
-#[derive(Debug)]
-pub struct FirstFrame {
-    last: Reactive,
-    first: Arc<Vec<ObjectEntry>>,
-    /// Whether the run's first frame is still to come.
-    waiting: bool,
+/// How sure a place is that one frame has shown.
+const CONFIDENCE: f64 = 0.7;
+
+/// What is kept, and beside it where things stood in the first frame. Where something was before is where the first frame
+/// shows it, also where it stands there again: that it has been elsewhere in between is not kept.
+pub(crate) struct FirstFrame {
+    now: Snapshot,
+    frame: FrameId,
+    places: Vec<(ObjectId, Place)>,
 }
 
 impl FirstFrame {
-    /// An empty memory.
-    pub fn new(library: Arc<TemplateLibrary>) -> FirstFrame {
-        FirstFrame { last: Reactive::new(library), first: Arc::default(), waiting: true }
+    /// Joins what is kept now and the first frame.
+    pub fn new(now: Snapshot, frame: FrameId, places: Vec<(ObjectId, Place)>) -> FirstFrame {
+        FirstFrame { now, frame, places }
     }
 }
 
-impl Memory for FirstFrame {
-    fn name(&self) -> &str {
-        "first-frame"
+impl MemoryView for FirstFrame {
+    fn library(&self) -> &TemplateLibrary {
+        self.now.library()
     }
-    fn expect(&self, now: Time) -> Expectation {
-        self.last.expect(now)
+    fn objects(&self) -> &[ObjectEntry] {
+        self.now.objects()
     }
-    fn observe(&mut self, observation: &Observation<'_>) -> Result<Grounding, MemoryError> {
-        let grounding = self.last.observe(observation)?;
-        let snapshot = self.last.snapshot();
-        if self.waiting && snapshot.frames_seen() > 0 {
-            (self.first, self.waiting) = (Arc::new(snapshot.objects().to_vec()), false);
+    fn transitions(&self) -> &[Transition] {
+        self.now.transitions()
+    }
+    fn skills(&self) -> &[SkillEntry] {
+        self.now.skills()
+    }
+    fn progress(&self) -> &TaskProgress {
+        self.now.progress()
+    }
+    fn support(&self) -> Option<&SupportPlane> {
+        self.now.support()
+    }
+    fn frames_seen(&self) -> u32 {
+        self.now.frames_seen()
+    }
+    fn retrieve(&self, query: &ObjectQuery) -> Retrieval {
+        self.now.retrieve(query)
+    }
+    fn recall_place(&self, object: ObjectId, reference: PlaceReference) -> Recall<Place> {
+        let recall = self.now.recall_place(object, reference);
+        let first = self.places.iter().find(|(id, _)| *id == object);
+        match (recall, first) {
+            (Recall::Unknown { .. }, Some((_, place))) if reference != PlaceReference::Now => {
+                Recall::Known { value: *place, confidence: CONFIDENCE, evidence: vec![Evidence::Frame(self.frame)] }
+            }
+            (recall, _) => recall,
         }
-        Ok(grounding)
     }
-    fn record(&mut self, executed: &Executed) -> Result<TransitionId, MemoryError> {
-        self.last.record(executed)
+    fn belief(&self, literal: &Literal) -> Belief {
+        self.now.belief(literal)
     }
-    fn settle(&mut self, transition: TransitionId, verdict: &Verdict) -> Result<(), MemoryError> {
-        self.last.settle(transition, verdict)
+    fn skill_candidates(&self, object: ObjectId, destination: Option<Place>) -> Vec<SkillCandidate> {
+        self.now.skill_candidates(object, destination)
     }
-    fn note(&mut self, note: &Note) -> Result<(), MemoryError> {
-        if *note == Note::EpisodeBegan {
-            (self.first, self.waiting) = (Arc::default(), true);
-        }
-        self.last.note(note)
+    fn predict(&self, candidate: &SkillCandidate) -> Prediction {
+        self.now.predict(candidate)
     }
-    fn wipe(&mut self) -> Result<(), MemoryError> {
-        self.last.wipe()?;
-        // The first frame of a run comes once. What is seen after a wipe is not it.
-        (self.first, self.waiting) = (Arc::default(), false);
-        Ok(())
-    }
-    fn events_since(&self, known: u64) -> Recent {
-        self.last.events_since(known)
-    }
-    fn view(&self) -> Arc<dyn MemoryView> {
-        Arc::new(LastFrame::new(self.last.snapshot(), Arc::clone(&self.first)))
+    fn object(&self, id: ObjectId) -> Option<&ObjectEntry> {
+        self.now.object(id)
     }
 }

@@ -5,16 +5,33 @@
 //! |---|---|
 //! | `acm` | everything: [`acm_memory::AcmMemory`] |
 //! | `paper-identity` | everything, with the paper's identity rule |
-//! | `reactive` | the last frame, what the hand feels, the last action, how far the instruction is done |
-//! | `first-frame` | the same and the places of the run's first frame |
+//! | `reactive` | the last frame, the last deed |
+//! | `first-frame` | the last frame and the run's first one; what was dealt with in the present subtask |
+//! | `window` | the last frames and the deeds since the first of them |
+//! | `action-log` | the last frame and all own deeds, with what they tell of places |
+//! | `keyframe` | a short window, and key frames: nominated ones, clustered by their number |
+//! | `embedding` | the last frame and a bank of frames, of which those are read that look most like the present one; what was dealt with |
+//! | `text-summary` | everything, as far as short sentences can say it |
+//! | `semantic` | each thing's looks and last known place; what was dealt with |
+//! | `full-history` | all frames, perceived again once it is known what is asked for, and all deeds |
+//! | `shuffled` | everything, but each thing has another one's past |
+//!
+//! What the hand feels and how far the instruction is done is the same for all of them. But for the first two and the last
+//! one, what a method does not keep is dropped after every call ([`Pruned`]), so that nothing later can rest on it.
 
 mod first_frame;
-mod last_frame;
+mod full_history;
+mod keeping;
 mod method;
-mod reactive;
+mod prune;
+mod pruned;
+mod shuffled;
+mod sights;
 #[cfg(test)]
 mod tests;
+mod words;
 
-pub use first_frame::FirstFrame;
+pub use full_history::{FullHistory, Perceive};
 pub use method::{METHODS, MethodError, UnknownMethod, by_name};
-pub use reactive::Reactive;
+pub use pruned::Pruned;
+pub use shuffled::Shuffled;

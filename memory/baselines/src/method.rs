@@ -1,13 +1,26 @@
 //! Methods by name, as `--method` takes them.
 
-use crate::{FirstFrame, Reactive};
+use crate::{FullHistory, Perceive, Pruned, Shuffled, keeping::KEEPINGS};
 use acm_concept::template::TemplateLibrary;
 use acm_memory::{AcmMemory, IdentityRule, Memory, MemoryError};
 use std::{path::Path, sync::Arc};
 use thiserror::Error;
 
 /// The names that [`by_name`] knows.
-pub const METHODS: [&str; 4] = ["acm", "paper-identity", "reactive", "first-frame"];
+pub const METHODS: [&str; 12] = [
+    "acm",
+    "paper-identity",
+    "reactive",
+    "first-frame",
+    "window",
+    "action-log",
+    "keyframe",
+    "embedding",
+    "text-summary",
+    "semantic",
+    "full-history",
+    "shuffled",
+];
 
 /// A name that is no method.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -28,25 +41,33 @@ pub enum MethodError {
     Memory(#[from] MemoryError),
 }
 
-/// The memory of a method. Those that keep everything keep it in `dir`, if one is given; `reactive` and
-/// `first-frame` keep nothing from one run to the next and leave `dir` alone.
+/// The memory of a method. Those that keep everything keep it in `dir`, if one is given; the others keep nothing from one
+/// run to the next and leave `dir` alone. `perceive` is for `full-history`, which perceives stored frames again.
 ///
 /// ```
 /// let library = std::sync::Arc::new(acm_memory::default_library().unwrap());
-/// assert_eq!(acm_baselines::by_name("reactive", library.clone(), None).unwrap().name(), "reactive");
-/// let error = acm_baselines::by_name("reactve", library, None).err().unwrap();
+/// assert_eq!(acm_baselines::by_name("reactive", library.clone(), None, None).unwrap().name(), "reactive");
+/// let error = acm_baselines::by_name("reactve", library, None, None).err().unwrap();
 /// assert!(error.to_string().contains("did you mean `reactive`?"));
 /// ```
-pub fn by_name(name: &str, library: Arc<TemplateLibrary>, dir: Option<&Path>) -> Result<Box<dyn Memory>, MethodError> {
+pub fn by_name(
+    name: &str,
+    library: Arc<TemplateLibrary>,
+    dir: Option<&Path>,
+    perceive: Option<Perceive>,
+) -> Result<Box<dyn Memory>, MethodError> {
     let acm = |library| match dir {
         Some(dir) => AcmMemory::open(dir, library),
         None => Ok(AcmMemory::in_memory(library)),
     };
+    if let Some(keeping) = KEEPINGS.iter().find(|keeping| keeping.name == name) {
+        return Ok(Box::new(Pruned::new(*keeping, library)));
+    }
     Ok(match name {
         "acm" => Box::new(acm(library)?),
         "paper-identity" => Box::new(acm(library)?.with_identity(IdentityRule::Paper)),
-        "reactive" => Box::new(Reactive::new(library)),
-        "first-frame" => Box::new(FirstFrame::new(library)),
+        "full-history" => Box::new(FullHistory::new(library, perceive)),
+        "shuffled" => Box::new(Shuffled::new(acm(Arc::clone(&library))?, library)),
         _ => return Err(unknown(name).into()),
     })
 }
