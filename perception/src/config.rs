@@ -79,6 +79,14 @@ pub struct GrounderConfig {
     pub size_sigma_lean: f64,
     /// Error of the height of a top, which depth shows too, as a share of how far the outline misses the fitted one.
     pub size_sigma_top: f64,
+    /// Where depth runs on, two colours that differ by less than this are one thing's.
+    pub parting_contrast: f32,
+    /// Two things explain so much more (log likelihood) than one does, where colour tells them apart.
+    pub parting_gain: f64,
+    /// Parts of one thing that are joined by their shape differ by less, in colour.
+    pub joining_tint: f32,
+    /// Evidence (log likelihood) that it takes to believe that what lies like the parts of one thing is one.
+    pub joining_coincidence: f64,
     /// Whether digits, marks, lamps and needles are read from the faces of things: it takes some milliseconds a thing.
     pub read: bool,
     /// Objects with a lower confidence are not reported.
@@ -123,6 +131,10 @@ impl Default for GrounderConfig {
             size_surface: 0.5,
             size_sigma_lean: 0.7,
             size_sigma_top: 0.2,
+            parting_contrast: 14.0,
+            parting_gain: 10.0,
+            joining_tint: 20.0,
+            joining_coincidence: 15.0,
             read: false,
             min_confidence: 0.15,
         }
@@ -160,6 +172,10 @@ impl GrounderConfig {
             ("size_surface", self.size_surface),
             ("size_sigma_lean", self.size_sigma_lean),
             ("size_sigma_top", self.size_sigma_top),
+            ("parting_contrast", f64::from(self.parting_contrast)),
+            ("parting_gain", self.parting_gain),
+            ("joining_tint", f64::from(self.joining_tint)),
+            ("joining_coincidence", self.joining_coincidence),
         ];
         let shares = [
             ("min_depth_fraction", self.min_depth_fraction),

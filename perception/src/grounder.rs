@@ -95,6 +95,7 @@ impl Grounder {
                 objects
                     .par_iter_mut()
                     .for_each(|object| object.readings = reading::read(scene, white, &object.support));
+                reading::part(&mut objects);
             }
             Percepts {
                 frame: frame.header.clone(),

@@ -67,7 +67,7 @@ pub(crate) fn find(scene: &Scene, standing: &[bool]) -> Vec<Patch> {
         }
     }
     join_pieces(scene, &ground, &mut pieces);
-    pieces.iter_mut().for_each(|piece| take_print(scene.grid, &covered, piece));
+    take_prints(scene, &covered, &mut pieces);
     pieces.into_iter().filter_map(|pixels| patch(scene, &ground, pixels)).collect()
 }
 
@@ -81,6 +81,27 @@ fn areas(scene: &Scene, (labels, sizes): (Vec<u32>, Vec<usize>)) -> Vec<Vec<usiz
     }
     areas.retain(|pixels| !pixels.is_empty());
     areas
+}
+
+/// Adds to each piece what is printed on it. What shows of the piece within print, such as the eyes of an 8, is no patch
+/// of its own.
+fn take_prints(scene: &Scene, covered: &[bool], pieces: &mut Vec<Vec<usize>>) {
+    let tints: Vec<Option<Tint>> = pieces.iter().map(|piece| mean_tint(scene, piece)).collect();
+    let mut eye = vec![false; pieces.len()];
+    for at in 0..pieces.len() {
+        take_print(scene.grid, covered, &mut pieces[at]);
+        let held = |other: usize| {
+            let alike = tints[at].zip(tints[other]).is_some_and(|(a, b)| a.distance(&b) < ALIKE);
+            other != at && alike && pieces[other].iter().all(|pixel| pieces[at].binary_search(pixel).is_ok())
+        };
+        (0..pieces.len()).for_each(|other| eye[other] |= held(other));
+    }
+    let mut eyes = eye.into_iter();
+    pieces.retain(|_| !eyes.next().unwrap_or(false));
+}
+
+fn mean_tint(scene: &Scene, pixels: &[usize]) -> Option<Tint> {
+    mean(pixels.iter().map(|&at| scene.scan.tint(at)))
 }
 
 /// Adds to a piece what is printed on it: what it encloses, where nothing stands and that is not too much of it.
@@ -149,12 +170,11 @@ fn rectangle(plan: &[DVec2]) -> Option<Rectangle> {
 /// Joins pieces of one patch that something standing on it, or the robot, cuts apart: pieces of one colour whose
 /// common rectangle is as full as their own. Where bare surface shows between them they are two patches.
 fn join_pieces(scene: &Scene, ground: &[Ground], pieces: &mut Vec<Vec<usize>>) {
-    let mean_tint = |pixels: &[usize]| mean(pixels.iter().map(|&i| scene.scan.tint(i)));
     let mut first = 0;
     while first < pieces.len() {
         let mut second = first + 1;
         while second < pieces.len() {
-            let tints = mean_tint(&pieces[first]).zip(mean_tint(&pieces[second]));
+            let tints = mean_tint(scene, &pieces[first]).zip(mean_tint(scene, &pieces[second]));
             let alike = tints.is_some_and(|(a, b)| a.distance(&b) < ALIKE);
             let joined: Vec<usize> = if alike {
                 let mut both: Vec<usize> = pieces[first].iter().chain(&pieces[second]).copied().collect();

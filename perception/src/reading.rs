@@ -9,12 +9,13 @@
 //! | `face` | plane faces of a thing, and their coordinates |
 //! | `ink`, `shape` | ground and spots; the shape of a spot |
 //! | `strokes`, `glyph` | how marks are drawn; what a patch of ink looks most like |
-//! | `text` | marks in lines, which way up |
+//! | `marks`, `text` | strokes that make marks; marks in lines, which way up |
 //! | `round` | lamps; dials and their needles |
 
 mod face;
 mod glyph;
 mod ink;
+mod marks;
 mod round;
 mod shape;
 mod strokes;
@@ -24,7 +25,7 @@ mod text;
 
 use crate::scene::{Scene, convex_hull};
 use acm_concept::{
-    object::PixelSupport,
+    object::{GroundedObject, PixelSupport},
     reading::{Content, Reading, Unreadable, Upright},
 };
 use face::Face;
@@ -33,6 +34,8 @@ use ink::Spot;
 use shape::Shape;
 use text::{Line, Ways};
 
+/// Readings that have this share of their place in common are of one thing.
+const SAME_PLACE: f64 = 0.5;
 /// Grounds within grounds: a display on a plate on a thing.
 const MAX_DEPTH: usize = 3;
 /// Spots of fewer pixels hold nothing.
@@ -43,6 +46,8 @@ const MAX_READINGS: usize = 16;
 const STRANGE: f32 = 12.0;
 /// A rectangle fills its box so far, seen by a camera; a mark does not.
 const PANEL_FILL: f64 = 0.87;
+/// What is so much of the outer ground's colour shows that ground.
+const BARE: f32 = 0.8;
 /// Beside more spots that are no marks there are no lamps.
 const MOST_UNREAD: usize = 3;
 /// As many lamps of one size are a pattern.
@@ -55,17 +60,60 @@ const SATURATED: f32 = 99.0;
 
 /// Reads what stands on a thing, given its pixels. Positions are in the world.
 pub(crate) fn read(scene: &Scene, white: f64, support: &PixelSupport) -> Vec<Reading> {
-    let mut readings = Vec::new();
+    let mut readings: Vec<Reading> = Vec::new();
     for face in face::find(scene, support) {
         let reader = Reader { scene, face: &face, white };
         let mut found = Vec::new();
         reader.ground(&face.mask, None, 0, &mut found);
-        readings.extend(found);
+        // A face that noise splits in two is read twice.
+        for reading in found {
+            match readings.iter().position(|known| overlap(known, &reading) > SAME_PLACE) {
+                Some(at) if worth(&reading) > worth(&readings[at]) => readings[at] = reading,
+                Some(_) => {}
+                None => readings.push(reading),
+            }
+        }
     }
     if readings.len() > MAX_READINGS {
         readings.clear();
     }
     readings
+}
+
+/// The common share of the places of two readings, of the smaller one's.
+fn overlap(a: &Reading, b: &Reading) -> f64 {
+    let side =
+        |k: usize| f64::from((a.bounds[k + 2].min(b.bounds[k + 2]) + 1).saturating_sub(a.bounds[k].max(b.bounds[k])));
+    side(0) * side(1) / area(a).min(area(b)).max(1.0)
+}
+
+fn area(reading: &Reading) -> f64 {
+    let [left, top, right, bottom] = reading.bounds.map(f64::from);
+    (right + 1.0 - left) * (bottom + 1.0 - top)
+}
+
+/// Of two readings of one place the one that says something is kept, then the one of more.
+fn worth(reading: &Reading) -> f64 {
+    match reading.content {
+        Content::Unreadable { .. } => 0.0,
+        _ => reading.confidence * area(reading),
+    }
+}
+
+/// A label that was taken for a thing of its own is read with the thing that it is on, too. What two things show in one
+/// place is the one's that says more of it, the smaller one's if both say the same. `objects` are ordered by size.
+pub(crate) fn part(objects: &mut [GroundedObject]) {
+    for small in 1..objects.len() {
+        let (larger, rest) = objects.split_at_mut(small);
+        let Some(label) = rest.first_mut() else { return };
+        for large in larger {
+            let rival = |own: &Reading, others: &[Reading], least: f64| {
+                others.iter().any(|other| overlap(own, other) > SAME_PLACE && worth(other) > worth(own) + least)
+            };
+            label.readings.retain(|own| !rival(own, &large.readings, 1.0));
+            large.readings.retain(|own| !rival(own, &label.readings, -1.0));
+        }
+    }
 }
 
 /// The lightness of the brightest matt surfaces of a frame: what 19 of 20 pixels do not exceed.
@@ -119,6 +167,8 @@ impl Reader<'_> {
         }
         // Among many spots that say nothing, round ones are a pattern too.
         if lamps.len() <= MAX_LAMPS && left <= MOST_UNREAD {
+            // What shows within a mark is no lamp.
+            lamps.retain(|lamp| out.iter().all(|known| overlap(known, lamp) < SAME_PLACE));
             out.extend(lamps);
         }
     }
@@ -146,7 +196,11 @@ impl Reader<'_> {
             .filter(|&&at| ink::distance(lab(at), own) > STRANGE && !ink::is_between(lab(at), own, drawing.ground))
             .count();
         let holes = inside.len() - spot.pixels.len();
-        fill > 0.72 && strange * 25 > inside.len()
+        // Ink whose colour lies between the panel's and the outer ground's: within a mark there is bare ground.
+        let bare = inside.iter().filter(|&&at| ink::share(lab(at), own, drawing.ground) > BARE).count();
+        let other_ink = holes * 25 > inside.len() && bare * 5 < holes;
+        fill > 0.72 && other_ink
+            || fill > 0.72 && strange * 25 > inside.len()
             || fill > PANEL_FILL && (holes * 50 > inside.len() || strange * 50 > inside.len())
     }
 

@@ -5,6 +5,7 @@
 //! says how far the patch is from that mark.
 
 use super::strokes::{MODELS, Model};
+use rayon::prelude::*;
 use std::sync::OnceLock;
 
 /// A patch of ink seen from the front, rows from the top; 0 ground, 1 ink.
@@ -27,6 +28,8 @@ const THIN: f32 = 0.4;
 /// Weight of a difference of widths, in their logarithm.
 const ASPECT_WEIGHT: f32 = 0.1;
 
+/// Less ink than this is none, such as a dark segment's, and so much less than full is full.
+const FAINT: f32 = 0.15;
 /// A drawing is no farther: two that share nothing, squared.
 const NOTHING_ALIKE: f32 = 4.0;
 /// Numbers that are compared at a time.
@@ -107,7 +110,7 @@ impl Patch {
         for (at, value) in field.iter_mut().enumerate() {
             let x = from_x + ((at % across) as f32 - PAD as f32 + 0.5) * step_x - 0.5;
             let y = from_y + ((at / across) as f32 - PAD as f32 + 0.5) * step_y - 0.5;
-            *value = self.at(x, y);
+            *value = ((self.at(x, y) - FAINT) / (1.0 - 2.0 * FAINT)).clamp(0.0, 1.0);
         }
         Some(Features { values: numbers(&field, across, down), aspect: aspect.ln() })
     }
@@ -196,57 +199,91 @@ fn excess(difference: f32) -> f32 {
 
 fn drawings() -> &'static [(char, Features)] {
     static DRAWINGS: OnceLock<Vec<(char, Features)>> = OnceLock::new();
-    DRAWINGS.get_or_init(|| {
-        let pens = [0.10, 0.16, 0.23];
-        let slants = [0.0, 0.1, 0.2];
-        let mut all = Vec::new();
-        for model in MODELS {
-            for pen in pens {
-                for slant in slants {
-                    // Signs as wide as high, digits narrower.
-                    let width = if model.mark.is_ascii_alphanumeric() { 0.6 } else { 0.95 };
-                    let mut faces = vec![draw(model, width, pen, slant, false)];
-                    if slant == 0.0 && !model.feet().is_empty() {
-                        faces.push(draw(model, width, pen, slant, true));
-                    }
-                    let features = faces.iter().filter_map(Patch::features);
-                    all.extend(features.map(|features| (model.mark, features)));
-                }
-            }
-        }
-        all
-    })
+    DRAWINGS.get_or_init(|| MODELS.par_iter().flat_map_iter(drawings_of).collect())
 }
 
-/// Draws a mark one high with a round pen, with feet or without.
-fn draw(model: &Model, width: f32, pen: f32, slant: f32, feet: bool) -> Patch {
-    const SCALE: f32 = 40.0;
+/// A mark drawn with every pen, upright and slanted, as cameras see it from near and from afar, with feet and without.
+fn drawings_of(model: &Model) -> Vec<(char, Features)> {
+    let mut all = Vec::new();
+    // Signs as wide as high, digits narrower.
+    let width = if model.mark.is_ascii_alphanumeric() { 0.6 } else { 0.95 };
+    for pen in PENS.iter().filter(|pen| pen.is_round() || model.is_written()) {
+        for slant in SLANTS {
+            for blur in BLURS {
+                let with_feet: &[bool] =
+                    if slant == 0.0 && !model.feet().is_empty() { &[false, true] } else { &[false] };
+                let faces = with_feet.iter().map(|feet| draw(model, width, *pen, slant, blur, *feet));
+                all.extend(faces.filter_map(|patch| Some((model.mark, patch.features()?))));
+            }
+        }
+    }
+    all
+}
+
+/// The end of a pen.
+#[derive(Debug, Clone, Copy)]
+struct Pen {
+    /// Half axes, heights of a mark.
+    half: (f32, f32),
+    /// Angle of the first, radians from the right.
+    angle: f32,
+    /// Whether it is a rectangle, as the dots of coarse print are, and not an ellipse.
+    square: bool,
+}
+
+impl Pen {
+    fn is_round(self) -> bool {
+        self.half.0 == self.half.1
+    }
+}
+
+/// Round pens, one with thick down strokes, a broad nib as a hand holds it, and one that draws in dots.
+const PENS: [Pen; 6] = [
+    Pen { half: (0.05, 0.05), angle: 0.0, square: false },
+    Pen { half: (0.08, 0.08), angle: 0.0, square: false },
+    Pen { half: (0.115, 0.115), angle: 0.0, square: false },
+    Pen { half: (0.08, 0.03), angle: 0.0, square: false },
+    Pen { half: (0.085, 0.035), angle: 0.5, square: false },
+    Pen { half: (0.12, 0.075), angle: 0.0, square: true },
+];
+const SLANTS: [f32; 3] = [0.0, 0.1, 0.2];
+/// Half the width of an edge, heights of a mark: one of some 16 pixels, and one of half as many.
+const BLURS: [f32; 2] = [0.04, 0.085];
+
+/// Draws a mark one high with a pen, with feet or without.
+fn draw(model: &Model, width: f32, pen: Pen, slant: f32, blur: f32, feet: bool) -> Patch {
+    const SCALE: f32 = 32.0;
     const MARGIN: f32 = 8.0;
-    /// Half the width of the blur of a mark that a camera sees in some 16 pixels.
-    const BLUR: f32 = 1.6;
-    let place = |(x, y): (f32, f32)| (MARGIN + SCALE * (x * width + slant * y), MARGIN + SCALE * (1.0 - y));
+    let thick = pen.half.0.max(pen.half.1);
     // A round end reaches half the pen's width further.
-    let gap = 0.5 * pen + 0.03;
+    let gap = thick + 0.03;
     let mut lines = model.pieces((gap / width, gap));
     if feet {
         lines.extend(model.feet());
     }
-    let pieces: Vec<[(f32, f32); 2]> = lines.into_iter().map(|ends| ends.map(place)).collect();
+    // In axes in which the pen's end is a disc of radius 1.
+    let (sin, cos) = pen.angle.sin_cos();
+    let bent = |(x, y): (f32, f32)| ((cos * x + sin * y) / pen.half.0, (cos * y - sin * x) / pen.half.1);
+    let pieces: Vec<[(f32, f32); 2]> =
+        lines.into_iter().map(|ends| ends.map(|(x, y)| bent((x * width + slant * y, y)))).collect();
     let size = |span: f32| (span * SCALE + 2.0 * MARGIN).ceil() as usize;
     let (columns, rows) = (size(width + slant), size(1.0));
+    let edge = (pen.half.0 * pen.half.1).sqrt() / (2.0 * blur);
     let ink = (0..columns * rows).map(|at| {
         let (x, y) = ((at % columns) as f32, (at / columns) as f32);
-        let away = pieces.iter().map(|ends| away(*ends, x, y)).fold(f32::INFINITY, f32::min);
-        (0.5 + (0.5 * pen * SCALE - away) / (2.0 * BLUR)).clamp(0.0, 1.0)
+        let (x, y) = bent(((x - MARGIN) / SCALE, 1.0 - (y - MARGIN) / SCALE));
+        let away = pieces.iter().map(|ends| away(*ends, x, y, pen.square)).fold(f32::INFINITY, f32::min);
+        (0.5 + (1.0 - away) * edge).clamp(0.0, 1.0)
     });
     Patch { width: columns, height: rows, ink: ink.collect() }
 }
 
-/// How far a point is from a line between two points.
-fn away([a, b]: [(f32, f32); 2], x: f32, y: f32) -> f32 {
+/// How far a point is from a line between two points; along the axes, if that is asked for.
+fn away([a, b]: [(f32, f32); 2], x: f32, y: f32, square: bool) -> f32 {
     let (dx, dy) = (b.0 - a.0, b.1 - a.1);
     let share = (((x - a.0) * dx + (y - a.1) * dy) / (dx * dx + dy * dy).max(1e-6)).clamp(0.0, 1.0);
-    (x - a.0 - share * dx).hypot(y - a.1 - share * dy)
+    let (x, y) = (x - a.0 - share * dx, y - a.1 - share * dy);
+    if square { x.abs().max(y.abs()) } else { x.hypot(y) }
 }
 
 /// A patch farther from every drawing is no mark.

@@ -86,6 +86,7 @@ pub(super) const MODELS: &[Model] = &[
     model('7', &[Line(&[(0.0, 1.0), (1.0, 1.0), (0.35, 0.0)]), Line(&[(0.25, 0.5), (0.9, 0.5)])]),
     model('7', &[Line(&[(0.0, 1.0), (1.0, 1.0), (0.55, 0.4), (0.45, 0.0)])]),
     model('7', &[Line(&[(0.0, 0.82), (0.0, 1.0), (1.0, 1.0), (0.3, 0.0)])]),
+    model('7', &[Line(&[(0.0, 0.78), (0.0, 1.0), (1.0, 1.0), (1.0, 0.7), (0.45, 0.42), (0.45, 0.0)])]),
     model('7', &[Bars("abc")]),
     model('7', &[Bars("abcf")]),
 
@@ -156,18 +157,32 @@ impl Model {
 }
 
 impl Model {
-    /// The feet that some faces of type give to straight strokes which end at the foot or the head; none for segments
-    /// and signs.
+    /// Whether it is drawn with a pen, unlike segments and signs.
+    pub fn is_written(&self) -> bool {
+        self.mark.is_ascii_alphanumeric() && !self.strokes.iter().any(|stroke| matches!(stroke, Bars(_)))
+    }
+    /// The feet that some faces of type give to straight strokes which reach the foot or the head steeply; none for
+    /// segments and signs.
     pub fn feet(&self) -> Vec<[(f32, f32); 2]> {
         const REACH: f32 = 0.22;
-        let ends = |stroke: &Stroke| match *stroke {
-            Line(points) if self.mark.is_ascii_alphanumeric() => [points.first(), points.last()],
-            _ => [None, None],
-        };
-        let foot = |&(x, y): &(f32, f32)| {
-            (y == 0.0 || y == 1.0).then_some([((x - REACH).max(-0.1), y), ((x + REACH).min(1.1), y)])
-        };
-        self.strokes.iter().flat_map(ends).flatten().filter_map(foot).collect()
+        const STEEP: f32 = 0.3;
+        if !self.is_written() {
+            return Vec::new();
+        }
+        let mut feet = Vec::new();
+        for stroke in self.strokes {
+            let Line(points) = *stroke else { continue };
+            for (at, &(x, y)) in points.iter().enumerate() {
+                let beside = [at.checked_sub(1), Some(at + 1)].into_iter().flatten().filter_map(|at| points.get(at));
+                let steep = beside.clone().any(|other| (other.1 - y).abs() > STEEP);
+                // A corner in which two strokes meet at a point, as a V's, has none.
+                let pointed = beside.filter(|other| (other.1 - y).abs() > STEEP).count() > 1;
+                if (y == 0.0 || y == 1.0) && steep && !pointed {
+                    feet.push([(x - REACH, y), (x + REACH, y)]);
+                }
+            }
+        }
+        feet
     }
 }
 

@@ -4,6 +4,7 @@ use super::{
     face::Face,
     glyph::{self, Match, Patch},
     ink::{self, Drawing},
+    marks,
     shape::{self, Shape},
 };
 use crate::scan::Scan;
@@ -15,10 +16,6 @@ const LEAST_HEIGHT_PX: f64 = 9.0;
 const LEAST_MARK_PX: f64 = 5.0;
 /// Larger than this, a mark is a thing's own shape.
 const MOST_MARK_PX: f64 = 200.0;
-/// Strokes of one mark, such as the segments of a digit, are no farther apart than this share of their width and this
-/// many pixels.
-const GAP_OF_STROKE: f64 = 0.5;
-const GAP_PX: f64 = 0.7;
 /// What is cut off and thinner is the border of a face, where the next one shows.
 const SLIVER_PX: f64 = 4.5;
 /// More marks are a texture or a paragraph.
@@ -72,10 +69,10 @@ pub(super) struct Ways {
 }
 
 /// Spots that make one mark.
-struct Mark {
-    spots: Vec<usize>,
+pub(super) struct Mark {
+    pub spots: Vec<usize>,
     patch: Patch,
-    cut: bool,
+    pub cut: bool,
     /// Corners in the ground's axes, metres.
     low: DVec2,
     high: DVec2,
@@ -88,9 +85,9 @@ struct Mark {
 
 /// A mark read one way up.
 #[derive(Debug, Clone)]
-struct Read {
-    matches: Vec<Match>,
-    bar: bool,
+pub(super) struct Read {
+    pub matches: Vec<Match>,
+    pub bar: bool,
 }
 
 /// The lines that the spots of a drawing make, without those that are taken for something else.
@@ -103,9 +100,10 @@ pub(super) fn lines(scan: &Scan, face: &Face, drawing: &Drawing, taken: &[bool],
             (!taken).then(|| Shape::of(face, &spot.pixels, ways.up)).flatten().filter(|shape| !is_disc(shape))
         })
         .collect();
-    let mut marks: Vec<Mark> = groups(face, drawing, &shapes)
+    let draw = |spots| mark(scan, face, drawing, &shapes, spots, ways);
+    let mut marks: Vec<Mark> = marks::groups(face, drawing, &shapes)
         .into_iter()
-        .filter_map(|spots| mark(scan, face, drawing, &shapes, spots, ways))
+        .filter_map(draw)
         .filter(|mark| !mark.cut || mark.size_px().min_element() > SLIVER_PX)
         .collect();
     // What is cut off and goes round another is the rim of a face that is mostly display.
@@ -119,6 +117,7 @@ pub(super) fn lines(scan: &Scan, face: &Face, drawing: &Drawing, taken: &[bool],
         return Vec::new();
     }
     let quarters: &[u8] = if ways.open { &[0, 1, 2, 3] } else { &[0] };
+    marks = marks::rejoin(marks, quarters, draw);
     let mut best: Option<(f32, u8, Vec<Line>)> = None;
     let mut all = Vec::new();
     for &quarter in quarters {
@@ -183,41 +182,6 @@ const TEMPERATURE: f32 = 0.025;
 const LEAST_CONFIDENCE: f64 = 0.7;
 /// And a mark without company, as which some scratch may pass.
 const LEAST_ALONE: f64 = 0.8;
-
-/// Joins the strokes of one mark.
-fn groups(face: &Face, drawing: &Drawing, shapes: &[Option<Shape>]) -> Vec<Vec<usize>> {
-    let count = shapes.len();
-    let mut group: Vec<usize> = (0..count).collect();
-    for a in 0..count {
-        for b in 0..a {
-            let (Some(first), Some(second)) = (&shapes[a], &shapes[b]) else { continue };
-            let (one, two) = (&drawing.spots[a], &drawing.spots[b]);
-            let reach = GAP_OF_STROKE * first.stroke_m.min(second.stroke_m) + GAP_PX / first.px_per_m;
-            if group[a] != group[b]
-                && first.apart(second) < reach
-                && ink::distance(one.color, two.color) < 30.0
-                && gap(face, &one.pixels, &two.pixels) < reach + 1.0 / first.px_per_m
-            {
-                let (from, to) = (group[a], group[b]);
-                group.iter_mut().filter(|g| **g == from).for_each(|g| *g = to);
-            }
-        }
-    }
-    let members = |root: usize| (0..count).filter(|&at| group[at] == root && shapes[at].is_some()).collect();
-    (0..count).filter(|&at| group[at] == at).map(members).filter(|spots: &Vec<usize>| !spots.is_empty()).collect()
-}
-
-/// The least distance between pixels of two spots, metres.
-fn gap(face: &Face, a: &[usize], b: &[usize]) -> f64 {
-    let grid = face.window.grid;
-    let near = |&pixel: &usize| grid.neighbours(pixel).count() == 4;
-    let places = |pixels: &[usize]| -> Vec<DVec2> {
-        pixels.iter().filter(|p| near(p)).take(400).map(|&p| face.place_of(p)).collect()
-    };
-    let (one, two) = (places(a), places(b));
-    let pairs = one.iter().flat_map(|p| two.iter().map(move |q| p.distance_squared(*q)));
-    pairs.fold(f64::INFINITY, f64::min).sqrt()
-}
 
 fn mark(
     scan: &Scan,
@@ -293,7 +257,7 @@ fn mark(
 }
 
 /// What a mark looks like with its up a number of quarter turns clockwise from the ground's.
-fn read(mark: &Mark, quarter: u8) -> Option<Read> {
+pub(super) fn read(mark: &Mark, quarter: u8) -> Option<Read> {
     // Its up on the right means that it is to be turned back, counter-clockwise.
     let features = mark.patch.turned((4 - quarter) % 4).features()?;
     let size = mark.size(quarter);
@@ -306,7 +270,7 @@ fn read(mark: &Mark, quarter: u8) -> Option<Read> {
 
 impl Mark {
     /// Its corners with up a number of quarter turns clockwise from the ground's.
-    fn corners(&self, quarter: u8) -> (DVec2, DVec2) {
+    pub fn corners(&self, quarter: u8) -> (DVec2, DVec2) {
         let turn = |p: DVec2| match quarter % 4 {
             0 => p,
             // Up is what was right, right is what was down.

@@ -157,6 +157,29 @@ fn turned_mats_and_blocks_keep_their_headings() {
 }
 
 #[test]
+fn what_shows_within_print_is_part_of_what_is_printed_on() {
+    const WOOD: [f64; 3] = [0.7, 0.45, 0.22];
+    let mut world = World::table();
+    world.block(DVec3::new(0.14, 0.185, 0.001), 0.0, 0.09, 0.0, WOOD);
+    // Two squares, one over the other: an eight whose eyes are large enough to be mats.
+    for (size, x, y) in [
+        ((0.068, 0.016), 0.0, 0.048),
+        ((0.068, 0.016), 0.0, 0.0),
+        ((0.068, 0.016), 0.0, -0.048),
+        ((0.016, 0.112), -0.026, 0.0),
+        ((0.016, 0.112), 0.026, 0.0),
+    ] {
+        world.block(DVec3::new(size.0, size.1, 0.0015), x, 0.09 + y, 0.0, [0.01; 3]);
+    }
+    let frame = Sensor::new(head_camera()).capture(&world, 5);
+    let reader = Grounder::new(library(), GrounderConfig { read: true, ..GrounderConfig::default() });
+    let percepts = reader.ground(&frame, &instruction());
+    assert_eq!(percepts.objects.len(), 1, "{}", summary(&percepts));
+    let read: Vec<String> = percepts.objects[0].readings.iter().map(ToString::to_string).collect();
+    assert!(read.len() == 1 && read[0].starts_with("`8`"), "{read:?}");
+}
+
+#[test]
 fn a_cube_is_never_a_button_and_a_disc_becomes_one_only_when_spoken_of() {
     let world = World::put_back_block((0.1, -0.1, 0.0));
     let only_button = Expectation { nouns: vec!["button".into()], ..Expectation::default() };
@@ -188,6 +211,8 @@ fn blindness_is_an_answer() {
         (with(frame.color.to_vec(), frame.depth.iter().map(|z| 1e-3 * z).collect()), Blindness::DepthScale),
         (with(frame.color.to_vec(), frame.depth.iter().map(|z| 1e3 * z).collect()), Blindness::DepthScale),
         (with(vec![255; 3 * pixels], frame.depth.to_vec()), Blindness::Overexposed),
+        // Depth at the end of the sensor's range of numbers, everywhere.
+        (with(frame.color.to_vec(), vec![65.535; pixels]), Blindness::DepthScale),
         // A wall: depth, but nothing to stand on.
         (with(frame.color.to_vec(), vec![1.0; pixels]), Blindness::NoSupport),
     ];
@@ -199,6 +224,26 @@ fn blindness_is_an_answer() {
         assert!(percepts.objects.is_empty() && percepts.support.is_none());
         assert_eq!(percepts.expected.len(), expectation.objects.len());
         assert!(percepts.expected.iter().all(|view| view.visibility == Visibility::NotMeasured));
+    }
+}
+
+#[test]
+fn what_lies_where_half_of_the_depth_is_missing_was_not_measured() {
+    let frame = Sensor::new(head_camera()).capture(&World::put_back_block((0.1, -0.1, 0.0)), 3);
+    let seen = ground("seen", &World::put_back_block((0.1, -0.1, 0.0)), head_camera(), 3, &instruction());
+    let expectation = remembered(&seen);
+    let width = frame.header.intrinsics.width as usize;
+    let left = |at: usize| at % width < width / 2;
+    let depth: Vec<f32> = frame.depth.iter().enumerate().map(|(at, z)| if left(at) { *z } else { 0.0 }).collect();
+    let half = RgbdFrame::new(frame.header.clone(), frame.color.clone(), depth.into()).unwrap();
+    let percepts = grounder().ground(&half, &expectation);
+    assert_eq!(percepts.blindness, None);
+    assert!(percepts.depth_fraction < 0.6, "{}", percepts.depth_fraction);
+    // The button stands on the left, everything else on the right: of that nothing is claimed, least of all its absence.
+    assert_eq!((of_category(&percepts, "button").len(), percepts.objects.len()), (1, 1), "{}", summary(&percepts));
+    for (view, object) in percepts.expected.iter().zip(&seen.objects) {
+        let wanted = if object.category == "button" { Visibility::Seen } else { Visibility::NotMeasured };
+        assert_eq!(view.visibility, wanted, "{}", object.category);
     }
 }
 
