@@ -4,6 +4,7 @@ use crate::{
     fit::{Evidence, OutlineKind, OutlinePoint},
     grid::Grid,
     measure::{self, Rectangle},
+    scan::Tint,
     scene::Scene,
     segments::NONE,
     surface_tint::mean,
