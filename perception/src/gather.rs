@@ -11,7 +11,7 @@ use crate::{
 };
 use glam::DVec2;
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     f64::consts::{FRAC_PI_2, PI},
     ops::Range,
 };
@@ -51,10 +51,12 @@ const MOSTLY: f64 = 0.5;
 const NEWS: f64 = 0.03;
 
 /// Makes one segment of all that stands up of an area of one colour, where a thing that the instruction speaks of, and that
-/// is on call, explains it. Segments with the labels in `known` are left as they are.
-pub(crate) fn gather(scene: &Scene, segments: &mut Segments, context: Context, known: &Range<u32>) {
+/// is on call, explains it. Segments with the labels in `known` are left as they are. Returns the labels of what was gathered,
+/// which is whole.
+pub(crate) fn gather(scene: &Scene, segments: &mut Segments, context: Context, known: &Range<u32>) -> BTreeSet<u32> {
+    let mut whole = BTreeSet::new();
     if !context.library.iter().any(|template| template.on_call && context.tries(template)) {
-        return;
+        return whole;
     }
     let labels = &segments.labels;
     let stands = |at: usize| labels[at] != NONE && !known.contains(&labels[at]);
@@ -86,17 +88,17 @@ pub(crate) fn gather(scene: &Scene, segments: &mut Segments, context: Context, k
         }
         // All of it, or what lies before a larger thing of the same colour; then without what sticks out.
         let least = scene.min_segment_px();
-        let (mut candidates, mut cores): (Vec<Vec<usize>>, Vec<Vec<usize>>) = Default::default();
+        let (mut candidates, mut cores): (Vec<(Vec<usize>, bool)>, Vec<(Vec<usize>, bool)>) = Default::default();
         for taken in [shares.len(), shares.len().saturating_sub(1)] {
             let mut all: Vec<usize> = shares.iter().take(taken).flatten().copied().collect();
             all.sort_unstable();
             let largest = shares.iter().take(taken).map(Vec::len).max().unwrap_or(0);
             let is_news = all.len() - largest >= (NEWS * all.len() as f64) as usize + 1;
-            cores.extend(core(scene, &all));
-            candidates.extend(Some(all).filter(|_| is_news));
+            cores.extend(core(scene, &all).map(|core| (core, true)));
+            candidates.push((all, is_news));
         }
         candidates.append(&mut cores);
-        candidates.retain(|candidate| candidate.len() >= least);
+        candidates.retain(|(candidate, _)| candidate.len() >= least);
         candidates.dedup();
         let measured = |share: &Vec<usize>| {
             let label = share.first().map(|&at| segments.labels[at])?;
@@ -104,13 +106,16 @@ pub(crate) fn gather(scene: &Scene, segments: &mut Segments, context: Context, k
         };
         let pieces: Vec<joins::Piece> =
             shares.iter().filter(|share| share.len() >= least).filter_map(measured).collect();
-        let explained = |pixels| explained(scene, segments, context, pixels, &pieces);
-        if let Some(found) = candidates.into_iter().find_map(explained) {
+        let explained = |(pixels, is_news)| Some((explained(scene, segments, context, pixels, &pieces)?, is_news));
+        // What is one segment already, and explained, is left as it is.
+        if let Some((found, true)) = candidates.into_iter().find_map(explained) {
+            whole.insert(found.label);
             *segments = found.segments;
             claim(scene, segments, found.label, known, &found.best);
         }
     }
     segments.drop_specks(scene.min_segment_px(), known);
+    whole
 }
 
 /// A gathering that something on call explains.
@@ -206,7 +211,8 @@ fn claim(scene: &Scene, segments: &mut Segments, label: u32, known: &Range<u32>,
         let other = segments.labels[at];
         let shown = (scene.scan.smooth[at] - depth as f32).abs() < NEAR_M;
         if other != NONE && other != label && !known.contains(&other) && shown {
-            let alike = scene.scan.tint(at).distance(&color) < OTHER;
+            let dark = (DARK - scene.scan.lab[at][0]).max(0.0);
+            let alike = scene.scan.tint(at).distance(&color) < OTHER + dark;
             if alike {
                 segments.labels[at] = label;
             }

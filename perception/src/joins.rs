@@ -100,8 +100,8 @@ enum Relation {
 }
 
 /// Joins pieces until no two belong together. Pieces with the labels in `known` are whole as they are: no two of them are
-/// joined, but to each may belong what is left beside it.
-pub(crate) fn join(scene: &Scene, segments: &mut Segments, context: Context, known: Range<u32>) {
+/// joined, but to each may belong what is left beside it. To what is `whole` only its floor and the camera's artefacts belong.
+pub(crate) fn join(scene: &Scene, segments: &mut Segments, context: Context, known: Range<u32>, whole: &BTreeSet<u32>) {
     let mut pieces: Vec<Piece> = (0..segments.count as u32)
         .into_par_iter()
         .zip(segments.pixels())
@@ -110,7 +110,8 @@ pub(crate) fn join(scene: &Scene, segments: &mut Segments, context: Context, kno
     // Pairs that the costly tests refused: asked again only when one of them has changed.
     let mut refused: BTreeSet<(Relation, u32, u32)> = BTreeSet::new();
     for _ in 0..MAX_JOINS {
-        let Some((first, second, relation)) = related(scene, segments, context, &pieces, &known, &mut refused) else {
+        let Some((first, second, relation)) = related(scene, segments, context, &pieces, (&known, whole), &mut refused)
+        else {
             return;
         };
         let name = if relation == Relation::Artefact { NONE } else { first };
@@ -139,7 +140,7 @@ fn related(
     segments: &Segments,
     context: Context,
     pieces: &[Piece],
-    known: &Range<u32>,
+    (known, whole): (&Range<u32>, &BTreeSet<u32>),
     refused: &mut BTreeSet<(Relation, u32, u32)>,
 ) -> Option<(u32, u32, Relation)> {
     let relations = [
@@ -157,7 +158,8 @@ fn related(
             |(a, b): &(&Piece, &Piece)| a.label != b.label && !(known.contains(&a.label) && known.contains(&b.label));
         for (a, b) in pairs.filter(unlike) {
             let key = (relation, a.label, b.label);
-            if refused.contains(&key) {
+            let more = !matches!(relation, Relation::Artefact | Relation::Floor);
+            if refused.contains(&key) || more && (whole.contains(&a.label) || whole.contains(&b.label)) {
                 continue;
             }
             let holds = match relation {

@@ -130,8 +130,8 @@ impl Grounder {
             let known = first..segments.count as u32;
             // What is hollow or cut in two is told by upright solids alone: they are many, and most are refused.
             let upright = Context { lying: false, displaced: &[], ..unremembered };
-            gather::gather(scene, &mut segments, upright, &known);
-            joins::join(scene, &mut segments, upright, known.clone());
+            let whole = gather::gather(scene, &mut segments, upright, &known);
+            joins::join(scene, &mut segments, upright, known.clone(), &whole);
             parting::part(scene, &mut segments, upright, known);
             let pixels = segments.pixels();
             explained.retain(|thing| pixels[thing.label as usize].len() == thing.pixels.len());
