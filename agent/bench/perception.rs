@@ -30,6 +30,8 @@ pub enum PerceptionPart {
     SmallCubes,
     /// Time of frames with ten things.
     Crowd,
+    /// One bad frame after good ones: what it changes of what memory has verified.
+    Overwrites,
     /// Digits, marks, lamps and needles.
     Reading,
     /// Joints of articulated things of the shared data, each seen in two states.
@@ -49,6 +51,7 @@ pub fn measure(args: &PerceptionArgs, targets: &Targets) -> anyhow::Result<Bench
             PerceptionPart::Suite => suite::measure(args, targets, &mut result),
             PerceptionPart::SmallCubes => suite::measure_small_cubes(args, &mut result),
             PerceptionPart::Crowd => suite::crowd::measure(args, &mut result),
+            PerceptionPart::Overwrites => suite::overwrites::measure(args, &mut result),
             PerceptionPart::Reading => reading::measure(args, &mut result),
             PerceptionPart::Articulation => articulation::measure(args, &mut result),
         };

@@ -206,7 +206,7 @@ fn join_pieces(scene: &Scene, ground: &[Ground], pieces: &mut Vec<Vec<usize>>) {
     }
 }
 
-/// Share of a rectangle's visible area that has the patch's colour.
+/// Share of a rectangle's visible area that is the patch's, print and all.
 fn fill(scene: &Scene, ground: &[Ground], rectangle: &Rectangle, pixels: &[usize]) -> f64 {
     const CELLS: usize = 24;
     let axis = DVec2::from_angle(rectangle.yaw);
@@ -222,8 +222,8 @@ fn fill(scene: &Scene, ground: &[Ground], rectangle: &Rectangle, pixels: &[usize
         let index = scene.grid.index(pixel.x.round().max(0.0) as usize, pixel.y.round().max(0.0) as usize);
         match ground[index] {
             Ground::Unknown => {}
-            Ground::Bare => known += 1,
-            Ground::Tinted => {
+            // Print may have the colour of the bare surface.
+            Ground::Bare | Ground::Tinted => {
                 known += 1;
                 inside += usize::from(pixels.binary_search(&index).is_ok());
             }

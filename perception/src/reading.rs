@@ -150,13 +150,15 @@ impl Reader<'_> {
                     _ => out.push(reading),
                 }
             } else if depth < MAX_DEPTH && self.is_panel(spot, &drawing) {
-                *taken = true;
                 let grid = self.face.window.grid;
                 let mut panel = vec![false; grid.len()];
-                for at in spot.solid(grid) {
-                    panel[at] = true;
-                }
-                self.ground(&panel, Some(drawing.ground), depth + 1, out);
+                let solid = spot.solid(grid);
+                solid.iter().for_each(|&at| panel[at] = true);
+                let mut within = Vec::new();
+                self.ground(&panel, Some(drawing.ground), depth + 1, &mut within);
+                // A block letter with eyes is filled like a panel, too, but what shows within says nothing.
+                *taken = !within.is_empty() || !self.is_open(spot, &solid, drawing.ground);
+                out.extend(within);
             }
         }
         let ways = self.ways(mask, depth);
@@ -197,11 +199,23 @@ impl Reader<'_> {
             .count();
         let holes = inside.len() - spot.pixels.len();
         // Ink whose colour lies between the panel's and the outer ground's: within a mark there is bare ground.
-        let bare = inside.iter().filter(|&&at| ink::share(lab(at), own, drawing.ground) > BARE).count();
-        let other_ink = holes * 25 > inside.len() && bare * 5 < holes;
+        let other_ink = holes * 25 > inside.len() && self.bare(spot, &inside, drawing.ground) * 5 < holes;
         fill > 0.72 && other_ink
             || fill > 0.72 && strange * 25 > inside.len()
             || fill > PANEL_FILL && (holes * 50 > inside.len() || strange * 50 > inside.len())
+    }
+
+    /// How many pixels within a spot show the ground that it stands on.
+    fn bare(&self, spot: &Spot, inside: &[usize], ground: [f32; 3]) -> usize {
+        let scan = self.scene.scan;
+        let lab = |at: usize| scan.lab[self.face.window.pixel(at, scan.grid)];
+        inside.iter().filter(|&&at| ink::share(lab(at), spot.color, ground) > BARE).count()
+    }
+
+    /// Whether what shows within a spot is mostly the ground that it stands on.
+    fn is_open(&self, spot: &Spot, inside: &[usize], ground: [f32; 3]) -> bool {
+        let holes = inside.len() - spot.pixels.len();
+        holes > 0 && self.bare(spot, inside, ground) * 2 > holes
     }
 
     /// The lamp or needle that a round spot is.

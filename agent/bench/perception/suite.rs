@@ -7,6 +7,7 @@
 //! | `scene`, `view` | a table of things from a seed; what a camera sees of it |
 //! | `labelled` | clouds of such things with what is true of them, for `acm learn` |
 //! | `crowd` | how long frames with many things take |
+//! | `overwrites` | what one bad frame changes of what memory has verified |
 //! | `score`, `tally` | one answer against the truth; the figures of many |
 //!
 //! Perception gets the noisy frame, the nominal calibration and an empty expectation; of the second frame of a crowd what
@@ -17,6 +18,7 @@ mod deviation;
 #[cfg(feature = "learned")]
 pub mod labelled;
 mod outline;
+pub mod overwrites;
 mod picture;
 mod plan;
 mod scene;
