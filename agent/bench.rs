@@ -88,6 +88,9 @@ pub struct BenchResult {
     pub notes: Vec<String>,
     /// Parts that ended with an error, and which; their figures are missing.
     pub errors: Vec<String>,
+    /// Whether it was interrupted from the keyboard.
+    #[serde(skip)]
+    pub interrupted: bool,
 }
 
 impl BenchResult {
@@ -104,6 +107,7 @@ impl BenchResult {
             rows: Vec::new(),
             notes: Vec::new(),
             errors: Vec::new(),
+            interrupted: false,
         }
     }
     /// Adds a figure.
@@ -152,7 +156,8 @@ impl BenchResult {
     }
 }
 
-/// Runs `acm bench`. It ends with 1 if a figure misses its floor or a part could not be measured.
+/// Runs `acm bench`. It ends with 1 if a figure misses its floor or a part could not be measured, with 130 if it was
+/// interrupted.
 pub fn run(command: &BenchCommand) -> anyhow::Result<Exit> {
     let (BenchCommand::Ablation(AblationArgs { common: args, .. })
     | BenchCommand::Perception(PerceptionArgs { common: args, .. })
@@ -189,6 +194,9 @@ fn finish(args: &BenchArgs, targets: &Targets, result: &BenchResult) -> anyhow::
     let misses = |(name, value): (&String, &f64)| {
         targets.of(result.bench, name).is_some_and(|target| target.verdict(*value) == Verdict::BelowFloor)
     };
+    if result.interrupted {
+        return Ok(Exit::Interrupted);
+    }
     Ok(if !result.errors.is_empty() || result.figures.iter().any(misses) { Exit::Failed } else { Exit::Success })
 }
 

@@ -39,6 +39,7 @@ pub fn measure(args: &RmbenchArgs) -> anyhow::Result<BenchResult> {
     let stopped = work::run(&plan, &mut ledger, args)?;
     let tallies = tally::tallies(&plan, ledger.records());
     let mut result = summary(&plan, &ledger, &tallies);
+    result.interrupted = stopped;
     if stopped {
         result.errors.push("interrupted: what was run is kept, the same command goes on with it".into());
     }
@@ -77,7 +78,7 @@ fn summary(plan: &Plan, ledger: &Ledger, tallies: &[Tally]) -> BenchResult {
         plan.workers,
         plan.program
     ));
-    result.notes.push("no setting of any memory was tuned on any block (docs/rmbench.md)".into());
+    result.notes.push("how the memories were set, and when, is told in docs/rmbench.md".into());
     result
 }
 

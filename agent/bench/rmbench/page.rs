@@ -91,6 +91,9 @@ pub fn html(plan: &Plan, tallies: &[Tally], result: &BenchResult, films: &[Film]
         result.build
     )?;
     list(&mut page, result.errors.iter(), "wrong")?;
+    if plan.blocks.len() > 1 {
+        side_by_side(&mut page, plan, tallies)?;
+    }
     for (block, first) in &plan.blocks {
         for jitter in plan.layouts() {
             let layout = if *jitter { "jittered layouts" } else { "published layouts" };
@@ -169,6 +172,23 @@ fn averages(page: &mut String, plan: &Plan, tallies: &[Tally], block: Block, jit
         )?;
     }
     writeln!(page, "</table>")
+}
+
+/// Strict success over all tasks of each memory, block by block.
+fn side_by_side(page: &mut String, plan: &Plan, tallies: &[Tally]) -> std::fmt::Result {
+    page.push_str("<h2>Blocks side by side: strict, mean over tasks</h2><table><tr><th>memory</th>");
+    let columns =
+        || plan.layouts().iter().flat_map(|jitter| plan.blocks.iter().map(move |(block, _)| (*block, *jitter)));
+    for (block, jitter) in columns() {
+        write!(page, "<th>{}{}</th>", block.word(), if jitter { ", jittered" } else { "" })?;
+    }
+    for contender in &plan.contenders {
+        write!(page, "</tr><tr><td>{}</td>", escape(&contender.to_string()))?;
+        for (block, jitter) in columns() {
+            write!(page, "<td>{}</td>", percent(Averages::of(tallies, contender, block, jitter).strict))?;
+        }
+    }
+    writeln!(page, "</tr></table>")
 }
 
 fn table(page: &mut String, tallies: &[&Tally]) -> std::fmt::Result {

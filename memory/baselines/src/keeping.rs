@@ -63,10 +63,11 @@ const fn keeping(name: &'static str, frames: Frames, deeds: Deeds) -> Keeping {
 }
 
 /// The methods that are told apart by what they keep.
-pub(crate) const KEEPINGS: [Keeping; 8] = [
+pub(crate) const KEEPINGS: [Keeping; 9] = [
     keeping("reactive", Frames::Last, Deeds::Last),
     keeping("first-frame", Frames::First, Deeds::Progress),
     keeping("window", Frames::Recent(RECENT), Deeds::Window),
+    keeping("window-2", Frames::Recent(2), Deeds::Window),
     keeping("action-log", Frames::Last, Deeds::All),
     keeping("keyframe", Frames::Key { recent: RECENT, most: RECENT }, Deeds::Window),
     keeping("embedding", Frames::Bank { most: BANK, read: RECENT }, Deeds::Progress),

@@ -7,7 +7,7 @@
 //! | `paper-identity` | everything, with the paper's identity rule |
 //! | `reactive` | the last frame, the last deed |
 //! | `first-frame` | the last frame and the run's first one; what was dealt with in the present subtask |
-//! | `window` | the last frames and the deeds since the first of them |
+//! | `window`, `window-2` | the last eight or two frames and the deeds since the first of them |
 //! | `action-log` | the last frame and all own deeds, with what they tell of places |
 //! | `keyframe` | a short window, and key frames: nominated ones, clustered by their number |
 //! | `embedding` | the last frame and a bank of frames, of which those are read that look most like the present one; what was dealt with |

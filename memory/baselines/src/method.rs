@@ -7,12 +7,13 @@ use std::{path::Path, sync::Arc};
 use thiserror::Error;
 
 /// The names that [`by_name`] knows.
-pub const METHODS: [&str; 12] = [
+pub const METHODS: [&str; 13] = [
     "acm",
     "paper-identity",
     "reactive",
     "first-frame",
     "window",
+    "window-2",
     "action-log",
     "keyframe",
     "embedding",

@@ -102,6 +102,10 @@ fn forget_oldest(content: &mut Content) {
     }
 }
 
+fn covers(entry: &ObjectEntry) -> bool {
+    entry.parts.iter().any(|part| part.affordances.iter().any(|word| word == "covering"))
+}
+
 impl Scene<'_> {
     /// A thing's place as its words say it.
     fn told(&self, place: &Place, of: ObjectId) -> Place {
@@ -113,16 +117,26 @@ impl Scene<'_> {
         let body = Body::of(&entry.parts, self.library)?;
         Some((body.centre, body.top_m))
     }
-    /// What now stands over a spot, hiding it.
+    /// What stands over a spot now, hiding it.
     fn over(&self, at: DVec3, but: ObjectId) -> Option<ObjectId> {
         let hides = |entry: &&ObjectEntry| {
-            let hollow = entry.parts.iter().any(|part| part.affordances.iter().any(|word| word == "covering"));
-            let body = Body::of(&entry.parts, self.library).filter(|_| entry.presence == Presence::Present && hollow);
-            entry.id != but && body.is_some_and(|body| body.top_m > at.z + FLAT_M && body.covers(at.truncate(), 0.0))
+            let there = entry.id != but && covers(entry) && entry.presence == Presence::Present;
+            let body = Body::of(&entry.parts, self.library).filter(|_| there);
+            body.is_some_and(|body| body.top_m > at.z + FLAT_M && body.covers(at.truncate(), 0.0))
         };
         self.objects.iter().find(hides).map(|entry| entry.id)
     }
-    /// `on O5, pointing left`, `under O3, pointing back`, or `on the table, middle, front, pointing back`.
+    /// What is in the middle under a cover that stands on a spot.
+    fn beneath(&self, at: DVec3, cover: ObjectId) -> Option<ObjectId> {
+        let cover = self.objects.iter().find(|entry| entry.id == cover && covers(entry))?;
+        let reach = Body::of(&cover.parts, self.library)?.extents()[0] / 4.0;
+        let is_near = |entry: &&ObjectEntry| {
+            let near = entry.pose().is_some_and(|pose| pose.translation.truncate().distance(at.truncate()) < reach);
+            near && entry.id != cover.id && !covers(entry)
+        };
+        self.objects.iter().find(is_near).map(|entry| entry.id)
+    }
+    /// `on O5, pointing left`, `under O3, ...`, `over O5, ...`, or `on the table, middle, front, pointing back`.
     fn say(&self, place: &Place, of: ObjectId) -> String {
         let at = place.pose.translation;
         let way = (place.pose.yaw() / FRAC_PI_4).round().rem_euclid(8.0) as usize;
@@ -131,6 +145,8 @@ impl Scene<'_> {
             format!("on {support}")
         } else if let Some(cover) = self.over(at, of) {
             format!("under {cover}")
+        } else if let Some(thing) = self.beneath(at, of) {
+            format!("over {thing}")
         } else {
             let part = |words: &[&'static str; 5], at: f64| words[((at.round() + 2.0).clamp(0.0, 4.0)) as usize];
             format!("on the table, {}, {}", part(&ACROSS, at.x / CELL_M.x), part(&ALONG, at.y / CELL_M.y))
@@ -147,7 +163,9 @@ impl Scene<'_> {
             place.strip_prefix("on the table, ").and_then(|part| part.split_once(", "))
         {
             (DVec2::new(cell(&ACROSS, across)?, cell(&ALONG, along)?) * CELL_M).extend(self.table_m)
-        } else if let Some((centre, _)) = place.strip_prefix("under O").and_then(named) {
+        } else if let Some((centre, _)) =
+            ["under O", "over O"].iter().find_map(|word| place.strip_prefix(word)).and_then(named)
+        {
             centre.extend(self.table_m)
         } else {
             let (centre, top_m) = place.strip_prefix("on O").and_then(named)?;
