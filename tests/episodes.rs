@@ -23,7 +23,7 @@ use std::{
 /// One renderer for all tests of this binary: it takes a second to start, and software drivers dislike several.
 fn with_runner<T>(test: impl FnOnce(&Runner) -> T) -> T {
     static RUNNER: OnceLock<Mutex<Runner>> = OnceLock::new();
-    let runner = RUNNER.get_or_init(|| Mutex::new(Runner::new().unwrap()));
+    let runner = RUNNER.get_or_init(|| Mutex::new(Runner::with_library(acm_memory::whole_library().unwrap()).unwrap()));
     test(&runner.lock().unwrap_or_else(PoisonError::into_inner))
 }
 

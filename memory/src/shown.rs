@@ -101,7 +101,7 @@ pub(crate) fn add(shown: &mut Vec<Shown>, readings: &[Reading], eye: DVec3, mome
     let said: Vec<Shown> = readings.iter().filter_map(|reading| of(reading, eye, moment)).collect();
     shown.iter_mut().for_each(|known| known.weight *= fading(known));
     for one in said {
-        match shown.iter_mut().find(|known| known.predicate == one.predicate && known.what == one.what) {
+        match shown.iter_mut().find(|known| is_same(known, &one)) {
             Some(known) => (known.weight, known.last) = (known.weight + one.weight, moment),
             None => shown.push(one),
         }
@@ -151,15 +151,26 @@ pub(crate) fn literals(id: ObjectId, shown: &[Shown], colored: Option<&Colored>)
     literals
 }
 
+/// Whether two readings are one: those of a needle may differ by a step.
+fn is_same(known: &Shown, one: &Shown) -> bool {
+    known.predicate == one.predicate
+        && match (known.predicate.as_str(), &known.what, &one.what) {
+            ("points", Term::Number(a), Term::Number(b)) => apart_deg(*a, *b) < 1.5 * NEEDLE_STEP,
+            (_, a, b) => a == b,
+        }
+}
+
 /// Whether two readings are too unlike to be one.
 fn differ(predicate: &str, a: &Term, b: &Term) -> bool {
     match (predicate, a, b) {
-        ("points", Term::Number(a), Term::Number(b)) => {
-            let apart = (a - b).rem_euclid(360.0);
-            apart.min(360.0 - apart) > 2.0 * NEEDLE_STEP - 1.0
-        }
+        ("points", Term::Number(a), Term::Number(b)) => apart_deg(*a, *b) > 2.0 * NEEDLE_STEP - 1.0,
         _ => a != b,
     }
+}
+
+fn apart_deg(a: f64, b: f64) -> f64 {
+    let apart = (a - b).rem_euclid(360.0);
+    apart.min(360.0 - apart)
 }
 
 fn of(reading: &Reading, eye: DVec3, moment: Moment) -> Option<Shown> {

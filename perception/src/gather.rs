@@ -76,11 +76,16 @@ pub(crate) fn gather(scene: &Scene, segments: &mut Segments, context: Context, k
             let left = |at: &usize| segments.labels[*at] == label;
             let inside: Vec<usize> = list.iter().copied().filter(|at| left(at) && blobs[*at] == blob).collect();
             let whole = inside.len() as f64 > MOSTLY * list.len() as f64;
-            if whole { list.iter().copied().filter(left).collect() } else { inside }
+            if whole { (list.iter().copied().filter(left).collect(), true) } else { (inside, false) }
         };
         let shares = (0u32..).zip(&pixels).filter(|(label, _)| !known.contains(label)).map(share);
-        let mut shares: Vec<Vec<usize>> = shares.filter(|share| !share.is_empty()).collect();
-        shares.sort_by_key(|share| share.len());
+        let mut shares: Vec<(Vec<usize>, bool)> = shares.filter(|(share, _)| !share.is_empty()).collect();
+        shares.sort_by_key(|(share, _)| share.len());
+        // The lesser part of a segment is the other colour of a thing of two.
+        if shares.last().is_none_or(|(_, whole)| !whole) {
+            continue;
+        }
+        let mut shares: Vec<Vec<usize>> = shares.into_iter().map(|(share, _)| share).collect();
         // Where colours run into each other a blob goes on into the next thing.
         let tint = |share: &Vec<usize>| Tint::of(&scene.scan.appearance(share).mean);
         if let Some(main) = shares.last().map(tint) {

@@ -189,9 +189,9 @@ mod tests {
                 .contains("its robot was `the tasks' own` and is `panda` now")
         );
         assert!(refusal(dir.path(), &plan(&["--sensor", "none"])).contains("its sensor was `d435`"));
-        let mut newer = plan(&[]);
-        newer.program = "9.9".into();
-        assert!(refusal(dir.path(), &newer).contains("its program was"));
+        let mut later = plan(&[]);
+        later.program = "9.9".into();
+        assert!(refusal(dir.path(), &later).contains("its program was"));
         assert!(refusal(dir.path(), &own).contains("the scenario has changed"));
         std::fs::write(dir.path().join("results.jsonl"), "no json\n").unwrap();
         assert!(refusal(dir.path(), &own).contains("line 1"));
