@@ -292,9 +292,15 @@ impl World {
                 vec![HistoryEntry { moment: now, place, cause: PlaceCause::Seen(FrameId(99)), verified: true }];
         }
     }
+    /// A frame in which everything can be seen.
+    fn see(&mut self) {
+        self.now = self.now + 0.1;
+        let now = moment(self.now);
+        self.objects.iter_mut().for_each(|entry| entry.last_seen = now);
+    }
     /// A look: what was lost is seen where it lies.
     pub fn look(&mut self) {
-        self.now = self.now + 0.1;
+        self.see();
         let now = moment(self.now);
         for (id, at) in std::mem::take(&mut self.lost) {
             let pose = Pose::from_translation(at.extend(TABLE_Z));
@@ -595,6 +601,7 @@ pub fn run(
                 assert!(!explanation.plan.is_empty() && !explanation.to_string().is_empty());
                 let invocation = planner.bind(step, world, &robot()).unwrap();
                 world.execute(step, invocation);
+                world.see();
             }
             Decision::Look { .. } => world.look(),
             Decision::SubtaskDone { index, .. } => {
