@@ -18,6 +18,8 @@ use world::{BLUE, Fault, GREEN, RED, World, moment, options, robot, situation};
 
 /// Episodes that are played.
 const EPISODES: u64 = 300;
+/// Wrong answers that are tried for one reading.
+const MAX_WRONG: u32 = 40;
 /// Decisions of one episode.
 const MAX_DECISIONS: u32 = 60;
 
@@ -91,14 +93,19 @@ fn read(planner: &Planner, world: &World, rng: &mut ChaCha8Rng) -> (Task, bool) 
     let by_rules = planner.parse(text, &world.library);
     let readable = INSTRUCTIONS.iter().find_map(|text| planner.parse(text, &world.library).ok()).unwrap();
     let task = by_rules.unwrap_or(readable);
-    let mut answer = serde_json::to_value(planner.answer(&task)).unwrap();
-    for _ in 0..rng.random_range(1..4) {
-        corrupt(&mut answer, rng);
+    let answer = serde_json::to_value(planner.answer(&task)).unwrap();
+    // It goes on until one of its wrong answers is taken.
+    for _ in 0..MAX_WRONG {
+        let mut wrong = answer.clone();
+        for _ in 0..rng.random_range(1..4) {
+            corrupt(&mut wrong, rng);
+        }
+        match planner.understand(&task.instruction, &world.library, &wrong) {
+            Ok(other) if other != task => return (other, true),
+            _ => {}
+        }
     }
-    match planner.understand(&task.instruction, &world.library, &answer) {
-        Ok(other) => (other, true),
-        Err(_) => (task, false),
-    }
+    (task, false)
 }
 
 /// What the model has the robot do: mostly anything but what is sensible.
@@ -130,7 +137,7 @@ fn world(rng: &mut ChaCha8Rng) -> World {
     world.visible.insert("pressed".into());
     for skill in ["pick", "place", "press"] {
         let fault = [Fault::Fails(FailureCause::Grasp), Fault::CannotTell].choose(rng).copied().unwrap();
-        if rng.random_bool(0.5) {
+        if rng.random_bool(0.8) {
             world.faults.push((skill, rng.random_range(1..4), fault));
         }
     }
@@ -203,7 +210,7 @@ fn a_hostile_model_gets_no_violated_precondition_executed() {
     println!("{EPISODES} episodes: {understood} wrong readings and {chosen} choices were taken, {executed} skills run");
     assert_eq!(violations, Vec::<String>::new());
     // It was hostile indeed: enough of what it said was taken, and enough was done on it.
-    assert!(understood * 5 >= EPISODES as u32 && chosen > 100 && executed > 300, "{understood} {chosen} {executed}");
+    assert!(understood * 2 >= EPISODES as u32 && chosen > 30 && executed > 300, "{understood} {chosen} {executed}");
 }
 
 /// The count sees violations: skills taken blindly from what memory offers have them.

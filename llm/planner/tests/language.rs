@@ -35,7 +35,9 @@ fn comes_back(planner: &Planner, library: &TemplateLibrary, task: &Task) {
     let faults: Vec<String> =
         SCHEMA.get_or_init(schema).iter_errors(&answer).map(|e| format!("{}: {e}", e.instance_path())).collect();
     assert_eq!(faults, Vec::<String>::new(), "{text}");
-    assert_eq!(planner.understand(text, library, &answer).as_ref(), Ok(task), "{text}");
+    // A model copies words as they are written: it puts none right.
+    let as_written = Task { corrections: Vec::new(), ..task.clone() };
+    assert_eq!(planner.understand(text, library, &answer).as_ref(), Ok(&as_written), "{text}");
 }
 
 fn outline(text: &str) -> Vec<String> {
@@ -113,12 +115,12 @@ fn an_unknown_noun_is_named_with_its_span() {
 
 #[test]
 fn a_typing_error_is_read_as_what_it_nearly_is_and_that_is_kept() {
-    let text = "Bring the cbue to the mddle, press teh button, then return it to where it came from.";
+    let text = "Bring the cbue to the mddle, press the buton, then return it to where it came from.";
     let task = parse(text).unwrap();
     assert_eq!(task.outline(), outline(CANONICAL));
     let corrections: Vec<(&str, &str)> =
         task.corrections.iter().map(|correction| (correction.span.of(text), correction.read.as_str())).collect();
-    assert_eq!(corrections, [("cbue", "cube"), ("mddle", "middle"), ("teh", "the")]);
+    assert_eq!(corrections, [("cbue", "cube"), ("mddle", "middle"), ("buton", "button")]);
     assert_eq!(parse(CANONICAL).unwrap().corrections, []);
 }
 

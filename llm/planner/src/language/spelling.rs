@@ -69,18 +69,20 @@ fn nearest<'a>(word: &str, known: impl Iterator<Item = &'a str>) -> Option<Strin
         (swapped || alike).then_some(distance)
     };
     let mut best: Option<(usize, BTreeSet<String>)> = None;
-    let mut consider = |candidate: &str, shown: String| {
+    let mut consider = |candidate: &str| {
         let Some(distance) = near(candidate) else { return };
         match &mut best {
             Some((least, _)) if distance > *least => {}
-            Some((least, words)) if distance == *least => _ = words.insert(shown),
-            _ => best = Some((distance, BTreeSet::from([shown]))),
+            Some((least, words)) if distance == *least => _ = words.insert(candidate.to_owned()),
+            _ => best = Some((distance, BTreeSet::from([candidate.to_owned()]))),
         }
     };
     for one in known {
-        consider(one, one.to_owned());
-        let several = format!("{one}s");
-        consider(&several, several.clone());
+        // A word is taken for a plural where it ends like one.
+        match word.ends_with('s') && !one.ends_with('s') {
+            true => consider(&format!("{one}s")),
+            false => consider(one),
+        }
     }
     let (_, words) = best?;
     <[String; 1]>::try_from(words.into_iter().collect::<Vec<_>>()).ok().map(|[word]| word)

@@ -214,11 +214,19 @@ impl Interpretation<'_> {
         Ok(())
     }
 
+    /// Whether the last thing asked for is that two things change places.
+    fn exchanged_last(&self) -> bool {
+        let last = self.drafts.last().map(|draft| &draft.subtask.goal);
+        matches!(last, Some(Goal::At { destination: Destination::Exchanged { .. }, .. }))
+    }
+
     /// "By way of the third tray", after "the two trays": the one that is left, wherever it stands in the row.
     fn third_of(&self, thing: &NounPhrase) -> NounPhrase {
         let named = |known: &ObjectReference| several(known) && known.noun == thing.noun;
         match thing.rank {
-            Some(Rank::FromSide(number, Direction::Left)) if number > 1 && self.references.iter().any(named) => {
+            Some(Rank::FromSide(number, Direction::Left))
+                if number > 1 && (self.references.iter().any(named) || self.exchanged_last()) =>
+            {
                 NounPhrase { rank: None, free: true, ..thing.clone() }
             }
             _ => thing.clone(),
