@@ -37,6 +37,10 @@ pub struct GrounderConfig {
     pub max_height_m: f32,
     /// Segments with fewer pixels are dropped.
     pub min_segment_px: usize,
+    /// A step in depth that parts two surfaces is larger than this, beside what distance, slope and noise explain.
+    pub depth_step_m: f32,
+    /// Two surfaces are one where more than this share of their common border runs on without a step or an inward bend.
+    pub smooth_border_share: f64,
     /// Most objects that one frame reports, the largest first.
     pub max_objects: usize,
     /// A flat patch must differ from the support's colour by this much chroma, illumination taken out.
@@ -79,14 +83,6 @@ pub struct GrounderConfig {
     pub size_sigma_lean: f64,
     /// Error of the height of a top, which depth shows too, as a share of how far the outline misses the fitted one.
     pub size_sigma_top: f64,
-    /// Where depth runs on, two colours that differ by less than this are one thing's.
-    pub parting_contrast: f32,
-    /// Two things explain so much more (log likelihood) than one does, where colour tells them apart.
-    pub parting_gain: f64,
-    /// Parts of one thing that are joined by their shape differ by less, in colour.
-    pub joining_tint: f32,
-    /// Evidence (log likelihood) that it takes to believe that what lies like the parts of one thing is one.
-    pub joining_coincidence: f64,
     /// Whether digits, marks, lamps and needles are read from the faces of things: it takes some milliseconds a thing.
     pub read: bool,
     /// Objects with a lower confidence are not reported.
@@ -111,6 +107,8 @@ impl Default for GrounderConfig {
             min_height_m: 0.006,
             max_height_m: 0.6,
             min_segment_px: 120,
+            depth_step_m: 0.005,
+            smooth_border_share: 0.65,
             max_objects: 64,
             patch_contrast: 13.0,
             min_patch_m: 0.025,
@@ -131,10 +129,6 @@ impl Default for GrounderConfig {
             size_surface: 0.5,
             size_sigma_lean: 0.7,
             size_sigma_top: 0.2,
-            parting_contrast: 14.0,
-            parting_gain: 10.0,
-            joining_tint: 20.0,
-            joining_coincidence: 15.0,
             read: false,
             min_confidence: 0.15,
         }
@@ -157,6 +151,7 @@ impl GrounderConfig {
             ("robot_margin_m", self.robot_margin_m),
             ("min_height_m", f64::from(self.min_height_m)),
             ("max_height_m", f64::from(self.max_height_m)),
+            ("depth_step_m", f64::from(self.depth_step_m)),
             ("patch_contrast", f64::from(self.patch_contrast)),
             ("min_patch_m", self.min_patch_m),
             ("outline_sigma_px", self.outline_sigma_px),
@@ -172,14 +167,11 @@ impl GrounderConfig {
             ("size_surface", self.size_surface),
             ("size_sigma_lean", self.size_sigma_lean),
             ("size_sigma_top", self.size_sigma_top),
-            ("parting_contrast", f64::from(self.parting_contrast)),
-            ("parting_gain", self.parting_gain),
-            ("joining_tint", f64::from(self.joining_tint)),
-            ("joining_coincidence", self.joining_coincidence),
         ];
         let shares = [
             ("min_depth_fraction", self.min_depth_fraction),
             ("min_support_fraction", self.min_support_fraction),
+            ("smooth_border_share", self.smooth_border_share),
             ("sigma_range", self.sigma_range),
             ("size_sigma_share", self.size_sigma_share),
             ("min_confidence", self.min_confidence),

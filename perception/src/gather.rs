@@ -93,12 +93,12 @@ pub(crate) fn gather(scene: &Scene, segments: &mut Segments, context: Context, k
         }
         // All of it, or what lies before a larger thing of the same colour; then without what sticks out.
         let least = scene.min_segment_px();
-        let (mut candidates, mut cores): (Vec<(Vec<usize>, bool)>, Vec<(Vec<usize>, bool)>) = Default::default();
+        let (mut candidates, mut cores) = (Vec::new(), Vec::new());
         for taken in [shares.len(), shares.len().saturating_sub(1)] {
             let mut all: Vec<usize> = shares.iter().take(taken).flatten().copied().collect();
             all.sort_unstable();
             let largest = shares.iter().take(taken).map(Vec::len).max().unwrap_or(0);
-            let is_news = all.len() - largest >= (NEWS * all.len() as f64) as usize + 1;
+            let is_news = all.len() - largest > (NEWS * all.len() as f64) as usize;
             cores.extend(core(scene, &all).map(|core| (core, true)));
             candidates.push((all, is_news));
         }

@@ -15,6 +15,8 @@ use std::{collections::BTreeSet, ops::Range};
 
 /// Most joins in one frame.
 const MAX_JOINS: usize = 24;
+/// Colours of the parts of one thing that are joined by their shape differ by less, in the units of a tint.
+const SAME_TINT: f32 = 20.0;
 /// Parts of one thing that do not touch in the image are nearer to each other than this.
 const NEAR_M: f64 = 0.02;
 /// What does not come lower than this stands on something else than the plane, or hangs.
@@ -26,15 +28,18 @@ const HANDLE_M: f64 = 0.032;
 /// Share of a fringe's outline along which the thing cuts it off, and of its pixels that are two from its border.
 const FRINGE_CUT: f64 = 0.3;
 const FRINGE_THICK: f64 = 0.1;
-/// Evidence (log likelihood) that it takes to believe that two things lie like the parts of one which is on call and of
-/// which the instruction speaks, and what it then explains of surface and outline.
+/// Evidence (negative log likelihood) that it takes to believe that two things lie like the parts of one.
+const COINCIDENCE: f64 = 15.0;
+/// The same where the one is on call and the instruction speaks of it, and what it then explains of surface and outline.
 pub(crate) const SPOKEN_OF: f64 = 60.0;
 const SPOKEN_OF_SURFACE: f64 = 0.96;
 const SPOKEN_OF_OUTLINE: f64 = 0.77;
 /// Each of two things explains this share of its surface and of its outline.
 const PARTED_SURFACE: f64 = 0.85;
 const PARTED_OUTLINE: f64 = 0.75;
-/// One explains less than this share of either: a thing of two colours is one.
+/// They explain so much more (log likelihood) than one does, and that one less than this share of either: a thing of two
+/// colours is one.
+const PARTED_GAIN: f64 = 10.0;
 const ONE_SURFACE: f64 = 0.93;
 const ONE_OUTLINE: f64 = 0.85;
 const ONE_OF_EITHER: f64 = 0.5;
@@ -272,7 +277,7 @@ fn is_one_with(scene: &Scene, segments: &Segments, context: Context, a: &Piece, 
     let either = [OutlineKind::Contact, OutlineKind::Cut, OutlineKind::Own];
     let touches = |piece: &Piece, other: &Piece| piece.evidence.border_share(other.label, &either) > 0.15;
     let tint = |piece: &Piece| Tint::of(&scene.scan.appearance(&piece.pixels).mean);
-    if a.label > b.label || tint(a).distance(&tint(b)) > context.config.joining_tint {
+    if a.label > b.label || tint(a).distance(&tint(b)) > SAME_TINT {
         return false;
     }
     // Parts that are apart in the image, as the jaws of what stands open, are near each other in space.
@@ -286,7 +291,7 @@ fn is_one_with(scene: &Scene, segments: &Segments, context: Context, a: &Piece, 
     let (coincidence, on_surface, on_outline) = match comparison.solids {
         1 => (0.0, 0.93, 0.85),
         _ if comparison.spoken_of => (SPOKEN_OF, SPOKEN_OF_SURFACE, SPOKEN_OF_OUTLINE),
-        _ => (context.config.joining_coincidence, 0.93, 0.85),
+        _ => (COINCIDENCE, 0.93, 0.85),
     };
     comparison.together < comparison.apart + coincidence
         && comparison.on_surface > on_surface
@@ -334,7 +339,7 @@ pub(crate) fn is_one(context: Context, one: &Hypothesis, whole: &Piece, pieces: 
     let Some(apart) = pieces.par_iter().map(each).sum::<Option<f64>>() else { return true };
     let independent: f64 = pieces.iter().map(|piece| piece.evidence.independent()).sum();
     let share = independent / whole.evidence.independent().max(1.0);
-    penalised(one, &whole.evidence) * share.max(1.0) < apart + context.config.joining_coincidence
+    penalised(one, &whole.evidence) * share.max(1.0) < apart + COINCIDENCE
 }
 
 /// Whether two pieces, which are `whole` together, are two things: two templates explain them well and better than one.
@@ -356,8 +361,7 @@ pub(crate) fn apart_or_together(context: Context, whole: &Piece, a: &Piece, b: &
     // A small thing on a large one hardly counts in what is explained of both.
     let of_either = [a, b].iter().all(|half| best.explained(&half.evidence).0 > ONE_OF_EITHER);
     let well = whole_explained.0 > ONE_SURFACE && whole_explained.1 > ONE_OUTLINE && of_either;
-    let gain = context.config.parting_gain;
-    !well && explained(first) && explained(second) && left + right + gain < together * share.max(1.0)
+    !well && explained(first) && explained(second) && left + right + PARTED_GAIN < together * share.max(1.0)
 }
 
 /// The evidence of two pieces as one; without the inner piece's surface if it is the inside of something hollow.

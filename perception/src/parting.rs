@@ -10,7 +10,8 @@ use crate::{
 };
 use std::ops::Range;
 
-/// Two colours differ by so many times their own spread.
+/// Two colours differ by at least this, in the units of a tint, and by so many times their own spread.
+const CONTRAST: f32 = 14.0;
 const TIMES_SPREAD: f32 = 4.3;
 /// What has one colour is mostly in one place; a pattern is not.
 const IN_ONE_PLACE: f64 = 0.85;
@@ -44,7 +45,7 @@ pub(crate) fn part(scene: &Scene, segments: &mut Segments, context: Context, kno
 /// The pixels of a segment by their two colours, both ascending; `None` if it has one, or a pattern.
 fn halves(scene: &Scene, pixels: &[usize]) -> Option<[Vec<usize>; 2]> {
     let tints: Vec<Tint> = pixels.iter().map(|&pixel| scene.scan.tint(pixel)).collect();
-    let means = two_means(&tints, scene.config.parting_contrast)?;
+    let means = two_means(&tints)?;
     let mut mask = vec![false; scene.grid.len()];
     let half = |first: bool, mask: &mut Vec<bool>| {
         mask.fill(false);
@@ -64,8 +65,8 @@ fn halves(scene: &Scene, pixels: &[usize]) -> Option<[Vec<usize>; 2]> {
 }
 
 /// The two colours of some pixels by Lloyd's algorithm, begun along the line on which they differ most; `None` if they are
-/// one: they differ by `least` at least.
-fn two_means(tints: &[Tint], least: f32) -> Option<[Tint; 2]> {
+/// one.
+fn two_means(tints: &[Tint]) -> Option<[Tint; 2]> {
     let count = tints.len().max(1) as f32;
     let mean = |of: &mut dyn Iterator<Item = &Tint>| {
         let (a, b, n) = of.fold((0.0f32, 0.0f32, 0usize), |(a, b, n), t| (a + t.a, b + t.b, n + 1));
@@ -88,7 +89,7 @@ fn two_means(tints: &[Tint], least: f32) -> Option<[Tint; 2]> {
     }
     let spread = tints.iter().map(|tint| tint.distance(&means[nearer(&means, tint)])).sum::<f32>() / count;
     let contrast = means[0].distance(&means[1]);
-    (contrast > least && contrast > TIMES_SPREAD * spread).then_some(means)
+    (contrast > CONTRAST && contrast > TIMES_SPREAD * spread).then_some(means)
 }
 
 #[cfg(test)]
@@ -99,12 +100,12 @@ mod tests {
     fn two_colours_are_told_from_one_that_varies() {
         let noisy = |a: f32, b: f32| (0..200).map(move |i| Tint { a: a + (i % 7) as f32, b: b - (i % 5) as f32 });
         let one: Vec<Tint> = noisy(10.0, 5.0).collect();
-        assert_eq!(two_means(&one, 14.0), None);
+        assert_eq!(two_means(&one), None);
         let two: Vec<Tint> = noisy(10.0, 5.0).chain(noisy(-30.0, 5.0).take(60)).collect();
-        let means = two_means(&two, 14.0).unwrap();
+        let means = two_means(&two).unwrap();
         assert!((means[0].a - means[1].a).abs() > 35.0, "{means:?}");
         let slope: Vec<Tint> = (0..300).map(|i| Tint { a: i as f32 * 0.1, b: 0.0 }).collect();
-        assert_eq!(two_means(&slope, 14.0), None);
-        assert_eq!(two_means(&[], 14.0), None);
+        assert_eq!(two_means(&slope), None);
+        assert_eq!(two_means(&[]), None);
     }
 }

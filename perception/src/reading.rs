@@ -200,8 +200,7 @@ impl Reader<'_> {
         let holes = inside.len() - spot.pixels.len();
         // Ink whose colour lies between the panel's and the outer ground's: within a mark there is bare ground.
         let other_ink = holes * 25 > inside.len() && self.bare(spot, &inside, drawing.ground) * 5 < holes;
-        fill > 0.72 && other_ink
-            || fill > 0.72 && strange * 25 > inside.len()
+        fill > 0.72 && (other_ink || strange * 25 > inside.len())
             || fill > PANEL_FILL && (holes * 50 > inside.len() || strange * 50 > inside.len())
     }
 

@@ -136,7 +136,7 @@ fn is_jump(scene: &Scene, normals: &[Vec3], index: usize) -> bool {
     let cosine = normals[index].dot((eye - scene.point[index]).normalize_or_zero()).clamp(0.2, 1.0);
     let slope = (1.0 - cosine * cosine).sqrt() / cosine;
     let expected = 4.0 * z / scene.scan.intrinsics.fx as f32 * slope;
-    high - low > 0.005 + 0.004 * z + 1.3 * expected + 1.5 * noise_m(scene, index)
+    high - low > scene.config.depth_step_m + 0.004 * z + 1.3 * expected + 1.5 * noise_m(scene, index)
 }
 
 /// The values in the square of half width `reach` round a pixel.
@@ -235,7 +235,7 @@ fn merge_smooth(scene: &Scene, normals: &[Vec3], segments: &mut Segments) {
         let mut sets = crate::grid::DisjointSets::new(segments.count);
         let mut merged = false;
         for ((a, b), (smooth, total)) in borders {
-            if total >= 8 && smooth as f64 > 0.65 * total as f64 {
+            if total >= 8 && smooth as f64 > scene.config.smooth_border_share * total as f64 {
                 sets.join(a as usize, b as usize);
                 merged = true;
             }

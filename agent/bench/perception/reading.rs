@@ -79,6 +79,8 @@ fn save(image: &image::RgbImage, path: &Path) -> anyhow::Result<()> {
 struct Verdict {
     /// Whether what was read is right; none if nothing was read.
     right: Option<bool>,
+    /// Whether what was not read says that it may stand upside down, and reads right one of the two ways.
+    turned: bool,
     /// The stated confidence of what was read.
     confidence: f64,
     /// Error of a needle, degrees.
@@ -115,8 +117,13 @@ struct Judged {
 fn judge(photo: &Photo, percepts: &Percepts) -> Verdict {
     let all: Vec<&Reading> = percepts.objects.iter().flat_map(|object| &object.readings).collect();
     let read: Vec<&&Reading> = all.iter().filter(|reading| told(reading)).collect();
+    let either = |reading: &&Reading| match (&photo.shown, &reading.content) {
+        (Shown::Text(truth), Content::Text { text, turned: Some(turned), .. }) => truth == text || truth == turned,
+        _ => false,
+    };
     let mut verdict = Verdict {
         right: None,
+        turned: read.is_empty() && all.iter().any(either),
         confidence: read.iter().map(|reading| reading.confidence).fold(0.0, f64::max),
         needle_deg: None,
         lamp: None,
@@ -214,6 +221,7 @@ fn row(name: String, group: &str, some: &[&Judged]) -> Row {
         ("right", count(Some(true)) / total),
         ("wrong", count(Some(false)) / total),
         ("unread", count(None) / total),
+        ("turned", some.iter().filter(|one| one.verdict.turned).count() as f64 / total),
         ("sure_and_wrong", sure as f64 / total),
     ];
     Row { group: Some(group.into()), ..Row::new(name, values) }

@@ -74,7 +74,7 @@ pub fn measure(args: &BenchArgs, result: &mut BenchResult) -> anyhow::Result<()>
     Ok(())
 }
 
-/// Values of the constants that decide which segments are one thing. The first is the one that is shipped; of the others
+/// Values of the constants by which frames are cut into segments. The first is the one that is shipped; of the others
 /// each differs from it in one constant.
 struct Setting {
     name: &'static str,
@@ -86,14 +86,14 @@ fn settings() -> Vec<Setting> {
     let setting = |name, config| Setting { name, config };
     vec![
         setting("as shipped", usual()),
-        setting("parting_contrast 10", GrounderConfig { parting_contrast: 10.0, ..usual() }),
-        setting("parting_contrast 20", GrounderConfig { parting_contrast: 20.0, ..usual() }),
-        setting("parting_gain 3", GrounderConfig { parting_gain: 3.0, ..usual() }),
-        setting("parting_gain 30", GrounderConfig { parting_gain: 30.0, ..usual() }),
-        setting("joining_tint 12", GrounderConfig { joining_tint: 12.0, ..usual() }),
-        setting("joining_tint 30", GrounderConfig { joining_tint: 30.0, ..usual() }),
-        setting("joining_coincidence 5", GrounderConfig { joining_coincidence: 5.0, ..usual() }),
-        setting("joining_coincidence 45", GrounderConfig { joining_coincidence: 45.0, ..usual() }),
+        setting("depth_step_m 0.003", GrounderConfig { depth_step_m: 0.003, ..usual() }),
+        setting("depth_step_m 0.008", GrounderConfig { depth_step_m: 0.008, ..usual() }),
+        setting("smooth_border_share 0.5", GrounderConfig { smooth_border_share: 0.5, ..usual() }),
+        setting("smooth_border_share 0.8", GrounderConfig { smooth_border_share: 0.8, ..usual() }),
+        setting("min_height_m 0.004", GrounderConfig { min_height_m: 0.004, ..usual() }),
+        setting("min_height_m 0.009", GrounderConfig { min_height_m: 0.009, ..usual() }),
+        setting("min_segment_px 80", GrounderConfig { min_segment_px: 80, ..usual() }),
+        setting("min_segment_px 180", GrounderConfig { min_segment_px: 180, ..usual() }),
     ]
 }
 

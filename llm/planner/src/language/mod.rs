@@ -45,8 +45,8 @@ pub(crate) fn parse(lexicon: &Lexicon, library: &TemplateLibrary, text: &str) ->
         let Some((tokens, corrections)) = spelling::corrected(lexicon, library, text, &tokens) else {
             return Err(error);
         };
-        let task = read(&tokens).map_err(|_| error)?;
-        Ok(Task { corrections, ..task })
+        // What is wrong with the text as it was written is what the reader of the error can look up.
+        read(&tokens).map_or(Err(error), |task| Ok(Task { corrections, ..task }))
     })
 }
 

@@ -188,7 +188,7 @@ impl Clause {
             + self.place.as_ref().map_or(0, PlacePhrase::places_named)
     }
     /// The side at which a group is begun, with the modifier that says so.
-    pub fn from_side(&self) -> Option<(&Modifier, Direction)> {
+    pub fn order_side(&self) -> Option<(&Modifier, Direction)> {
         let orders = self.modifiers.iter().filter(|modifier| modifier.kind == ModifierKind::Order);
         orders.filter_map(|modifier| Some((modifier, modifier.side?))).next()
     }

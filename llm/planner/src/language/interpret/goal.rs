@@ -71,7 +71,7 @@ impl Interpretation<'_> {
         let mut goals = Vec::new();
         for object in objects {
             let body = self.body(clause, object)?;
-            let side = clause.from_side();
+            let side = clause.order_side();
             if self.quantity_several(object) {
                 let order = side.map_or(Ordering::Any, |(_, side)| Ordering::From(side));
                 goals.push(Goal::Each { members: object, order, body });
@@ -361,7 +361,7 @@ impl Interpretation<'_> {
         // Named, so that "them" and "each lid" have something to mean.
         self.reference(object, &Role::Affordance(COVERING))?;
         let members = self.reference(under, &Role::Mentioned)?;
-        let order = clause.from_side().map(|(_, side)| side);
+        let order = clause.order_side().map(|(_, side)| side);
         let covered = Goal::State { predicate: "covered".into(), object: members, holds: true, by: None };
         let order = order.map_or(Ordering::Any, Ordering::From);
         Ok(Some(Goal::Each { members, order, body: vec![covered] }))
@@ -384,7 +384,7 @@ impl Interpretation<'_> {
             return Ok(false);
         }
         let mut goals = self.body(clause, members)?;
-        let side = clause.from_side().map(|(_, side)| side);
+        let side = clause.order_side().map(|(_, side)| side);
         if let Some(draft) = self.drafts.last_mut()
             && let Goal::Each { body, order, .. } = &mut draft.subtask.goal
         {
