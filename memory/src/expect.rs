@@ -1,6 +1,10 @@
 //! What a camera should see now, from all that is believed.
 
-use crate::{entry::Presence, identity::predict::predicted_parts, state::State};
+use crate::{
+    entry::{PlaceCause, Presence},
+    identity::predict::predicted_parts,
+    state::State,
+};
 use acm_concept::{
     expectation::{Expectation, ExpectedObject},
     time::Time,
@@ -15,6 +19,9 @@ const HELD_SIGMA_M: f64 = 0.01;
 
 /// The expectation at `now`. Missing objects are not expected anywhere.
 pub(crate) fn expect(state: &State, now: Time) -> Expectation {
+    let was_put = |entry: &crate::entry::ObjectEntry| {
+        entry.history.last().is_some_and(|last| last.place.is_some() && matches!(last.cause, PlaceCause::Own(_)))
+    };
     let expected = |entry: &crate::entry::ObjectEntry| {
         let held = entry.presence == Presence::Held;
         let track = state.track(entry.id);
@@ -37,6 +44,7 @@ pub(crate) fn expect(state: &State, now: Time) -> Expectation {
             // What may be another object is measured anew, not by what it is taken for.
             views: if track.doubt.is_some() { 0 } else { entry.views },
             held,
+            was_put: !held && !earlier_run && track.doubt.is_none() && was_put(entry),
         }
     };
     let there = state.objects.iter().filter(|entry| entry.presence != Presence::Missing);

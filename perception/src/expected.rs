@@ -37,6 +37,8 @@ pub(crate) struct Ghost {
     pub appearance: Appearance,
     pub views: u32,
     pub held: bool,
+    /// Whether the robot put it there.
+    pub was_put: bool,
     pub solids: Vec<PlacedSolid>,
     /// Told by its colour alone.
     pub flat: bool,
@@ -51,7 +53,7 @@ pub(crate) struct Ghost {
 pub(crate) struct Known<'a> {
     /// The main part.
     pub part: &'a GroundedPart,
-    /// Whether it was seen often enough that its parameters need not be measured anew.
+    /// Whether it was seen often enough, or put there, that its parameters need not be measured anew.
     pub settled: bool,
 }
 
@@ -59,7 +61,7 @@ impl Ghost {
     /// What memory expects here; nothing of a thing without parts.
     pub fn known(&self) -> Option<Known<'_>> {
         let part = self.main.as_ref()?;
-        Some(Known { part, settled: self.views >= SETTLED_VIEWS })
+        Some(Known { part, settled: self.was_put || self.views >= SETTLED_VIEWS })
     }
     /// Its predicted pixels in which it is seen, ascending.
     pub fn agreeing(&self) -> impl Iterator<Item = usize> + '_ {
@@ -122,6 +124,7 @@ impl Remembered {
                 appearance: object.appearance,
                 views: object.views,
                 held: object.held,
+                was_put: object.was_put,
                 flat,
                 in_view: cast.in_view,
                 votes: cast.hits.into_iter().map(vote).collect(),

@@ -6,6 +6,7 @@ mod bases;
 mod beliefs;
 mod completion;
 mod explained;
+mod put;
 mod single;
 
 pub use assisted::{Assisted, AssistedGrounder};
@@ -163,7 +164,11 @@ impl Grounder {
             remembered: None,
         };
         // A tool that segments is asked about all that stands there.
-        let mut explained = if aid.is_none() { explained::find(scene, unremembered, remembered) } else { Vec::new() };
+        let mut explained = Vec::new();
+        if aid.is_none() {
+            explained = explained::find(scene, unremembered, remembered);
+            explained.append(&mut put::find(scene, unremembered, remembered, &explained));
+        }
         let mut segments = self.segments(scene, unremembered, remembered, &mut explained);
         aid.cut(scene, &expectation.nouns, &mut segments);
         let standing: Vec<bool> = segments.labels.iter().map(|label| *label != NONE).collect();

@@ -289,7 +289,7 @@ fn upright_measures(rest: &Rest, extents: DVec3) -> [f64; 4] {
 }
 
 /// A model with the parameters and the rest of a remembered part, and the place and heading where it is remembered.
-fn as_remembered<'a>(
+pub(crate) fn as_remembered<'a>(
     context: Context<'a>,
     part: &GroundedPart,
     measured: &Measured,
@@ -357,7 +357,7 @@ fn canonical(model: &Model, minimum: Minimum, evidence: &Evidence) -> Option<Min
     None
 }
 
-fn score(context: Context, model: &Model, minimum: &Minimum, evidence: &Evidence) -> f64 {
+pub(crate) fn score(context: Context, model: &Model, minimum: &Minimum, evidence: &Evidence) -> f64 {
     let template = model.template;
     let values = model.placement(&minimum.state).values;
     let named = template.named(&values);

@@ -26,6 +26,8 @@ pub struct ExpectedObject {
     pub views: u32,
     /// Whether the hand holds it.
     pub held: bool,
+    /// Whether the robot itself put it where it is predicted: which object it is, is in no doubt there.
+    pub was_put: bool,
 }
 
 /// The whole expectation for one frame. An empty one is valid and means that nothing is known.

@@ -9,7 +9,7 @@ use crate::{
     scene::Scene,
     segments::{NONE, Segments},
 };
-use acm_concept::template::SeenBy;
+use acm_concept::{ids::ObjectId, template::SeenBy};
 use glam::DVec2;
 use rayon::prelude::*;
 
@@ -31,6 +31,7 @@ const ODD_SPREADS: f32 = 2.0;
 
 /// A known thing that was found where memory expects it, with the fit that says so.
 pub(super) struct Explained<'a> {
+    pub id: ObjectId,
     pub known: Known<'a>,
     /// Its segment, once there are segments.
     pub label: u32,
@@ -70,7 +71,7 @@ pub(super) fn find<'a>(scene: &Scene, context: Context<'a>, remembered: &'a Reme
         let base = bodies.base_under(&plan, lowest_m, &evidence);
         let measured = Measured { plan, height_m: 0.0, base, seen_by: SeenBy::Depth };
         let fit = hypotheses::recognise(Context { remembered: Some(known), ..context }, &measured, &evidence)?;
-        Some(Explained { known, label: NONE, pixels, evidence, fit })
+        Some(Explained { id: ghosts[at].id, known, label: NONE, pixels, evidence, fit })
     };
     let above = pieces.split_off(pieces.partition_point(|piece| piece.0 < OFF_THE_PLANE_M));
     let mut found: Vec<Explained> = pieces.into_par_iter().filter_map(|piece| fit(&bodies, piece)).collect();
@@ -163,7 +164,7 @@ fn is_thick(scene: &Scene, pixel: usize, holds: impl Fn(usize) -> bool) -> bool 
 }
 
 /// Whether some pixels have a thing's colours: all of them together, and each patch of them.
-fn has_its_colors(scene: &Scene, ghost: &Ghost, pixels: &[usize]) -> bool {
+pub(super) fn has_its_colors(scene: &Scene, ghost: &Ghost, pixels: &[usize]) -> bool {
     let remembered = Tint::of(&ghost.appearance.mean);
     if pixels.is_empty() || Tint::of(&scene.scan.appearance(pixels).mean).distance(&remembered) > SAME_TINT {
         return false;

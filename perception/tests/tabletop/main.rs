@@ -277,6 +277,7 @@ fn remembered(percepts: &Percepts) -> Expectation {
         appearance: o.appearance,
         confidence: o.confidence,
         held: false,
+        was_put: false,
     };
     Expectation { objects: percepts.objects.iter().enumerate().map(object).collect(), ..instruction() }
 }
