@@ -231,7 +231,7 @@ impl Reader<'_> {
         let solid = spot.solid(grid);
         let shape = Shape::of(self.face, &solid, DVec2::Y)?;
         let scan = self.scene.scan;
-        let (content, confidence) = round::needle(scan, self.face, &solid, &shape)
+        let (content, confidence) = round::needle(scan, self.face, &shape)
             .or_else(|| round::lamp(scan, self.face, &solid, &shape, self.white))?;
         Some(self.reading(content, confidence, &solid, shape.size().y * shape.px_per_m))
     }

@@ -60,7 +60,7 @@ pub(super) fn lamp(scan: &Scan, face: &Face, solid: &[usize], shape: &Shape, whi
 }
 
 /// Where the needle of a round dial points, with a confidence; `None` for what is no dial or has none.
-pub(super) fn needle(scan: &Scan, face: &Face, solid: &[usize], shape: &Shape) -> Option<(Content, f64)> {
+pub(super) fn needle(scan: &Scan, face: &Face, shape: &Shape) -> Option<(Content, f64)> {
     let diameter_px = shape.size().min_element() * shape.px_per_m;
     if diameter_px < LEAST_DIAL_PX || !shape.is_round(0.13) {
         return None;
@@ -68,8 +68,8 @@ pub(super) fn needle(scan: &Scan, face: &Face, solid: &[usize], shape: &Shape) -
     let grid = face.window.grid;
     let (centre, radius) = (shape.middle(), 0.25 * shape.size().element_sum());
     let lab = |at: usize| scan.lab[face.window.pixel(at, scan.grid)];
-    let inner: Vec<usize> =
-        solid.iter().copied().filter(|&at| face.place_of(at).distance(centre) < 0.85 * radius).collect();
+    // A needle that ends at a mark of the scale is not surrounded by its dial.
+    let inner: Vec<usize> = (0..grid.len()).filter(|&at| face.place_of(at).distance(centre) < 0.85 * radius).collect();
     let (ground, sigma) = ink::ground(&inner, lab)?;
     // Not the hub nor the scale, which may be of other colours.
     let between = |at: &usize| (FROM * radius..0.75 * radius).contains(&face.place_of(*at).distance(centre));
