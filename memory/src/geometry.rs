@@ -117,6 +117,32 @@ impl Body {
     }
 }
 
+/// What two measurements of one surface differ by, metres.
+const SAME_SURFACE_M: f64 = 0.008;
+
+/// The share of the solids of `parts` that lies in the solids of `other`, or as near as two measurements of one surface do:
+/// of points spread evenly in their boxes. What stands within walls shares nothing with them.
+pub(crate) fn shared(parts: &[GroundedPart], other: &[GroundedPart], library: &TemplateLibrary) -> f64 {
+    let solids = |parts: &[GroundedPart]| -> Vec<PlacedSolid> {
+        let placed = parts.iter().filter_map(|part| Some((part.pose.pose, library.solids_of(part)?)));
+        placed
+            .flat_map(|(at, own)| own.into_iter().map(move |s| PlacedSolid { solid: s.solid, pose: at * s.pose }))
+            .collect()
+    };
+    let others = solids(other);
+    let (mut inside, mut all) = (0usize, 0usize);
+    for solid in solids(parts) {
+        let half = solid.solid.half_extents();
+        for step in 0..27 {
+            let share = |axis: u32| f64::from((step / 3i32.pow(axis)) % 3 - 1) * 0.8;
+            let point = solid.pose.transform_point(DVec3::new(share(0), share(1), share(2)) * half);
+            all += 1;
+            inside += usize::from(others.iter().any(|other| other.signed_distance(point) < SAME_SURFACE_M));
+        }
+    }
+    inside as f64 / all.max(1) as f64
+}
+
 /// The symmetry of a grounded part; a part whose template cannot say is taken to have none.
 pub fn symmetry(part: &GroundedPart, library: &TemplateLibrary) -> YawSymmetry {
     library

@@ -2,10 +2,10 @@
 
 use crate::{
     draft::{Draft, Stage, Staged},
-    entry::{Moment, ObjectEntry, PlaceCause, Presence},
+    entry::{HistoryEntry, Moment, ObjectEntry, PlaceCause, Presence},
     event::{Anchor, Change, Glance, Pending, Track},
     fusion,
-    geometry::Body,
+    geometry::{self, Body},
     hand::HandFeeling,
     identity::{self, IdentityRule, MAX_PERCEPTS, Match, Percept, doubt::Doubt, predict},
     observation::{Grounding, Observation, Resolved},
@@ -43,6 +43,8 @@ const FRAGMENT_AREA: f64 = 0.7;
 /// A scrap has less than this share of the area of what it belongs to, and touches it within so much, metres.
 const SCRAP_AREA: f64 = 0.5;
 const SCRAP_GAP_M: f64 = 0.01;
+/// What shares more than this of its place with something larger is part of that.
+const TAKEN_IN: f64 = 0.75;
 /// Matches above this probability may verify an object.
 const SURE_MATCH: f64 = 0.6;
 
@@ -228,6 +230,7 @@ impl Frame<'_, '_, '_> {
         let full = self.draft.state.objects.len() + self.stage.added() >= MAX_OBJECTS;
         let piece = self.is_piece_of_known(percept, found, matches)
             || self.is_fragment(percept, matches)
+            || self.is_part_of_shown(None, &percept.parts)
             || self.is_scrap(percept);
         if object.confidence < FALSE_ALARM || full || piece {
             return None;
@@ -312,17 +315,19 @@ impl Frame<'_, '_, '_> {
                 continue;
             }
             let absences = self.draft.state.track(view.object).absences;
+            let taken_in = view.visibility == Visibility::Seen && self.is_taken_in(entry);
             match view.visibility {
+                _ if taken_in => {}
                 Visibility::Seen if absences == 0 => continue,
                 Visibility::Seen | Visibility::SeenThrough => {}
                 Visibility::Occluded | Visibility::OutOfView | Visibility::NotMeasured => continue,
             }
             let Some(staged) = self.stage.touch(&self.draft.state, view.object) else { continue };
-            if view.visibility == Visibility::Seen {
+            if view.visibility == Visibility::Seen && !taken_in {
                 staged.track.absences = 0;
                 continue;
             }
-            let fraction = view.fraction.clamp(0.0, 1.0);
+            let fraction = if taken_in { STRONG_ABSENCE } else { view.fraction.clamp(0.0, 1.0) };
             staged.track.absences += u32::from(fraction >= STRONG_ABSENCE);
             staged.entry.confidence *= 1.0 - 0.5 * fraction;
             if staged.track.absences >= 2 || fraction > CERTAIN_ABSENCE {
@@ -333,6 +338,23 @@ impl Frame<'_, '_, '_> {
                 self.grounding.missing.push(view.object);
             }
         }
+    }
+
+    /// Whether what was taken for a thing, and never moved by the robot, is part of something larger that this frame shows.
+    fn is_taken_in(&self, entry: &ObjectEntry) -> bool {
+        let own = |known: &HistoryEntry| matches!(known.cause, PlaceCause::Own(_) | PlaceCause::Grasped(_));
+        !entry.history.iter().any(own) && self.is_part_of_shown(Some(entry.id), &entry.parts)
+    }
+
+    /// Whether some parts are part of something larger that this frame shows: two solids cannot share a place.
+    fn is_part_of_shown(&self, own: Option<ObjectId>, parts: &[GroundedPart]) -> bool {
+        let library = self.draft.library;
+        let Some(body) = Body::of(parts, library).filter(|body| body.height() > FLAT_M) else { return false };
+        let shown = self.grounding.resolved.iter().filter(|found| found.accepted && Some(found.object) != own);
+        shown.filter_map(|found| self.stage.entry(&self.draft.state, found.object)).any(|other| {
+            let larger = Body::of(&other.parts, library).is_some_and(|b| FRAGMENT_AREA * b.area() > body.area());
+            larger && geometry::shared(parts, &other.parts, library) > TAKEN_IN
+        })
     }
 }
 

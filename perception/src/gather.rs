@@ -19,8 +19,10 @@ use std::{
 /// What explains a gathering explains these shares of its surface and of its outline,
 const ON_SURFACE: f64 = 0.96;
 const ON_OUTLINE: f64 = 0.7;
-/// and no more than this share of it is empty: bare surface by its colour, or so much behind it, beyond what noise does.
+/// and no more than this share of it is empty (of anything else more than the second): bare surface by its colour, or so much
+/// behind it, beyond what noise does.
 const EMPTY: f64 = 0.06;
+const MOSTLY_EMPTY: f64 = 0.35;
 const BEHIND_M: f64 = 0.008;
 /// What a gathered thing shows is measured this near to it.
 const NEAR_M: f32 = 0.008;
@@ -119,7 +121,11 @@ pub(crate) fn gather(scene: &Scene, segments: &mut Segments, context: Context, k
             claim(scene, segments, found.label, known, &found.best);
         }
     }
-    segments.drop_specks(scene.min_segment_px(), known);
+    // What a segment has left where something was taken from it may be its edge alone.
+    let mut left = vec![0usize; segments.count];
+    segments.labels.iter().filter(|label| **label != NONE).for_each(|label| left[*label as usize] += 1);
+    let lost = |label: u32| pixels.get(label as usize).is_some_and(|list| left[label as usize] < list.len());
+    segments.drop_scraps(scene.grid, scene.min_segment_px(), |label| !known.contains(&label) && lost(label));
     whole
 }
 
@@ -180,10 +186,13 @@ fn core(scene: &Scene, pixels: &[usize]) -> Option<Vec<usize>> {
     (CORE..1.0 - NEWS).contains(&share).then_some(core)
 }
 
-/// Drops the best of what may explain a segment while it is on call and partly empty, and something else is left.
+/// Drops the best of what may explain a segment while it is partly empty, if it is on call, or mostly, and something else
+/// is left.
 pub(crate) fn drop_empty(scene: &Scene, ranked: &mut Vec<Hypothesis>) {
-    while ranked.len() > 1 && ranked[0].model.template.on_call && empty(scene, &ranked[0]) > EMPTY {
-        ranked.remove(0);
+    let limit = |found: &Hypothesis| if found.model.template.on_call { EMPTY } else { MOSTLY_EMPTY };
+    let is_full = |found: &Hypothesis| empty(scene, found) <= limit(found);
+    if let Some(full) = ranked.iter().position(is_full) {
+        ranked.drain(..full);
     }
 }
 

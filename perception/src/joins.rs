@@ -28,6 +28,8 @@ const HANDLE_M: f64 = 0.032;
 /// Share of a fringe's outline along which the thing cuts it off, and of its pixels that are two from its border.
 const FRINGE_CUT: f64 = 0.3;
 const FRINGE_THICK: f64 = 0.1;
+/// So much less (log likelihood) is explained where what is no scrap is taken for one.
+const SPOILT: f64 = 100.0;
 /// Evidence (negative log likelihood) that it takes to believe that two things lie like the parts of one.
 const COINCIDENCE: f64 = 15.0;
 /// The same where the one is on call and the instruction speaks of it, and what it then explains of surface and outline.
@@ -170,7 +172,7 @@ fn related(
             let holds = match relation {
                 Relation::Artefact => is_ramp_of(a, b) || is_fringe_of(scene, a, b),
                 Relation::Floor => is_floor_of(a, b),
-                Relation::Surface => is_fragment_of(scene, a, b),
+                Relation::Surface => is_fragment_of(scene, segments, context, a, b),
                 Relation::Attached => is_attached_to(scene, pieces, a, b),
                 Relation::Inside => is_inside_of(scene, segments, context, a, b),
                 Relation::OtherEnd => is_other_end(scene, segments, context, a, b),
@@ -213,14 +215,19 @@ fn is_floor_of(outer: &Piece, floor: &Piece) -> bool {
 
 /// Whether `small` is a rim, handle or the like of `whole`: it touches it and does not rise above it, and either does
 /// not reach the plane, so that it can stand on nothing else, or is a scrap of the same colour.
-fn is_fragment_of(scene: &Scene, whole: &Piece, small: &Piece) -> bool {
+fn is_fragment_of(scene: &Scene, segments: &Segments, context: Context, whole: &Piece, small: &Piece) -> bool {
     let touches = small.evidence.border_share(whole.label, &[OutlineKind::Contact]);
     if touches < 0.12 || small.pixels.len() * 3 > whole.pixels.len() || small.top_m > whole.top_m + 0.005 {
         return false;
     }
     let tint = |piece: &Piece| Tint::of(&scene.scan.appearance(&piece.pixels).mean);
     let is_scrap = || small.pixels.len() * 8 < whole.pixels.len() && tint(small).distance(&tint(whole)) < 7.0;
-    small.lowest_m > HOVERING_M || is_scrap()
+    // What stands on the plane beside it may be a thing of its own, whose shape the one cannot take in.
+    let spoils = || {
+        let joint = union(scene, segments, whole, small, false);
+        compare(context, &joint, whole, small).is_some_and(|both| both.together > both.apart + SPOILT)
+    };
+    small.lowest_m > HOVERING_M || is_scrap() && !spoils()
 }
 
 /// Whether `small` sticks out of `whole`, as a handle before a door: it is near it and no higher, and hangs in the air with

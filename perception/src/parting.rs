@@ -14,7 +14,7 @@ use std::ops::Range;
 const CONTRAST: f32 = 14.0;
 const TIMES_SPREAD: f32 = 4.3;
 /// What has one colour is mostly in one place; a pattern is not.
-const IN_ONE_PLACE: f64 = 0.85;
+const IN_ONE_PLACE: f64 = 0.75;
 /// Most cuts in one frame.
 const MAX_CUTS: usize = 12;
 
@@ -57,11 +57,11 @@ fn halves(scene: &Scene, pixels: &[usize]) -> Option<[Vec<usize>; 2]> {
         let held = *size as f64 > IN_ONE_PLACE * all as f64 && *size >= scene.min_segment_px();
         held.then(|| pixels.iter().copied().filter(|&pixel| labels[pixel] == largest).collect::<Vec<_>>())
     };
-    let second = half(false, &mut mask)?;
-    half(true, &mut mask)?;
-    // Specks of the second colour stay with the first.
-    let first = pixels.iter().copied().filter(|pixel| second.binary_search(pixel).is_err()).collect();
-    Some([first, second])
+    let (second, first) = (half(false, &mut mask)?, half(true, &mut mask)?);
+    let lesser = if first.len() < second.len() { first } else { second };
+    // Specks of the lesser colour stay with the other.
+    let rest = pixels.iter().copied().filter(|pixel| lesser.binary_search(pixel).is_err()).collect();
+    Some([rest, lesser])
 }
 
 /// The two colours of some pixels by Lloyd's algorithm, begun along the line on which they differ most; `None` if they are

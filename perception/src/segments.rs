@@ -36,12 +36,13 @@ impl Segments {
         self.count += 1;
         label
     }
-    /// Drops segments of fewer pixels than `least`; the others, and those in `kept`, keep their labels.
-    pub fn drop_specks(&mut self, least: usize, kept: &std::ops::Range<u32>) {
-        let mut sizes = vec![0; self.count];
-        self.labels.iter().filter(|label| **label != NONE).for_each(|label| sizes[*label as usize] += 1);
-        for label in self.labels.iter_mut().filter(|label| **label != NONE && !kept.contains(label)) {
-            if sizes[*label as usize] < least {
+    /// Drops connected pieces of fewer pixels than `least` of the segments of which `open` holds; all keep their labels.
+    pub fn drop_scraps(&mut self, grid: Grid, least: usize, open: impl Fn(u32) -> bool) {
+        let labels = &self.labels;
+        let mask: Vec<bool> = labels.iter().map(|&label| label != NONE && open(label)).collect();
+        let (pieces, sizes) = grid.components(&mask, |a, b| labels[a] == labels[b]);
+        for (label, piece) in self.labels.iter_mut().zip(pieces) {
+            if sizes.get(piece as usize).is_some_and(|size| *size < least) {
                 *label = NONE;
             }
         }

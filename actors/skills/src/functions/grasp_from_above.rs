@@ -37,6 +37,8 @@ const DEEPER_M: f64 = 0.007;
 const DEEPENING_ATTEMPTS: u32 = 2;
 /// The test tug is a gentle lift by this much, metres.
 const TUG_M: f64 = 0.025;
+/// What was taken is raised by this much at least, metres: for anybody to see that it is.
+const LIFT_M: f64 = 0.08;
 /// A gap that has changed by more than this since closing means that the part moved in the grip, metres; then the
 /// hold is no surer than the confidence below.
 const SLIP_M: f64 = 0.002;
@@ -103,7 +105,7 @@ impl GraspFromAbove {
         let lift_height_m = safe_height(hand, at, at, &obstacles, support_m, below_m)?;
         // A failed grasp leaves the part standing: the empty fingers must clear its top as well.
         let above_top_m = top_m + hand.tip_reach_m + SAFETY_M;
-        let carry_height_m = lift_height_m.max(above_top_m).max(grip_height_m + 2.0 * TUG_M);
+        let carry_height_m = lift_height_m.max(above_top_m).max(grip_height_m + LIFT_M);
         Ok(GraspFromAbove {
             object: invocation.part.object,
             base: Pose::from_yaw(base.translation.with_z(support_m), base.yaw()),

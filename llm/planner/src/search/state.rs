@@ -13,15 +13,17 @@ use acm_concept::{
 };
 use acm_memory::{
     MemoryView,
-    entry::{ObjectEntry, Presence},
+    entry::{ObjectEntry, Presence, Transition, TransitionResult},
 };
 use glam::{DVec2, DVec3};
 use std::collections::BTreeMap;
 
 /// Overlap of heights and outlines that is taken for noise, metres.
 const TOUCH_M: f64 = 0.003;
-/// Distance that is kept round things put aside, metres.
-const CLEARANCE_M: f64 = 0.03;
+/// Distances that are kept round things put aside, metres: room for the fingers, or less where there is none.
+const CLEARANCES_M: [f64; 2] = [0.055, 0.03];
+/// Where a thing could not be put, it is not put so near either, metres.
+const SAME_SPOT_M: f64 = 0.03;
 /// How far beyond the outermost things a free spot is looked for, metres: farther where there is none nearer, since
 /// nothing is known of the table's edge and of the arm's reach there.
 const MARGINS_M: [f64; 3] = [0.05, 0.12, 0.2];
@@ -235,20 +237,33 @@ impl<'v> State<'v> {
             extents.chain(reserved).collect()
         };
         let yaw = entry.pose().map_or(0.0, |pose| pose.yaw());
-        for (keep_off_flat, margin) in [true, false].into_iter().flat_map(|keep| MARGINS_M.map(|margin| (keep, margin)))
-        {
+        let failed: Vec<DVec2> = self.failed_places(object);
+        let tried = [true, false].into_iter().flat_map(|keep| MARGINS_M.map(|margin| (keep, margin)));
+        let tried = tried.flat_map(|(keep, margin)| CLEARANCES_M.map(|clearance_m| (keep, margin, clearance_m)));
+        for (keep_off_flat, margin, clearance_m) in tried {
             let taken = taken(keep_off_flat);
             for spot in ring_spots(start) {
                 let inside = spot.cmpge(low - margin).all() && spot.cmple(high + margin).all();
                 let place = self.place_at(spot, object, yaw);
                 let extent = place.and_then(|place| Extent::at(self.view, entry, &place.pose));
-                let free = |extent: &Extent| taken.iter().all(|other| other.gap(extent) > CLEARANCE_M);
-                if inside && extent.as_ref().is_some_and(free) {
+                let free = |extent: &Extent| taken.iter().all(|other| other.gap(extent) > clearance_m);
+                let is_new = failed.iter().all(|failed| failed.distance(spot) > SAME_SPOT_M);
+                if inside && is_new && extent.as_ref().is_some_and(free) {
                     return place;
                 }
             }
         }
         None
+    }
+
+    /// Where the object was to be put, and could not be.
+    fn failed_places(&self, object: ObjectId) -> Vec<DVec2> {
+        let now = self.view.object(object).map(|entry| entry.last_seen.episode);
+        let failed = |t: &&Transition| {
+            Some(t.moment.episode) == now && t.object() == object && matches!(t.result, TransitionResult::Failed { .. })
+        };
+        let place = |t: &Transition| t.report.invocation.destination.map(|place| flat(&place.pose));
+        self.view.transitions().iter().filter(failed).filter_map(place).collect()
     }
 
     /// The place for an object on or in a thing that carries nothing and shall carry nothing else.
