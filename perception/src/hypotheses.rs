@@ -128,15 +128,18 @@ pub(crate) fn rank<'a>(context: Context<'a>, measured: &Measured, evidence: &Evi
         .filter_map(|s| s.nearest(&rough))
         .collect();
     let best = near.iter().map(|a| a.cost).fold(f64::INFINITY, f64::min);
-    // What is far behind after the rough fit is not worth a fine one.
-    let promising = near.into_par_iter().filter(|a| a.cost < HOPELESS_FACTOR * best + HOPELESS_COST);
-    let mut scored: Vec<Hypothesis<'a>> = promising
-        .filter_map(|Approach { model, state, .. }| {
-            let minimum = canonical(&model, minimise(&model, evidence, &state), evidence)?;
-            let score = score(context, &model, &minimum, evidence);
-            Some(Hypothesis { model, minimum, score, probability: 0.0, tracked: None })
-        })
-        .collect();
+    // What is far behind after the rough fit is not worth a fine one, unless what was ahead does not admit what it comes to.
+    let (promising, rest): (Vec<Approach>, Vec<Approach>) =
+        near.into_iter().partition(|a| a.cost < HOPELESS_FACTOR * best + HOPELESS_COST);
+    let fitted = |Approach { model, state, .. }: Approach<'a>| {
+        let minimum = canonical(&model, minimise(&model, evidence, &state), evidence)?;
+        let score = score(context, &model, &minimum, evidence);
+        Some(Hypothesis { model, minimum, score, probability: 0.0, tracked: None })
+    };
+    let mut scored: Vec<Hypothesis<'a>> = promising.into_par_iter().filter_map(fitted).collect();
+    if scored.is_empty() {
+        scored = rest.into_par_iter().filter_map(fitted).collect();
+    }
     scored.extend(track(context, measured, &rectangles, evidence));
     scored.sort_by(|a, b| b.score.total_cmp(&a.score));
     if let Some(other) = scored.first().and_then(|best| tipped::read_anew(context, best, evidence)) {

@@ -1,5 +1,6 @@
 //! References of a task grounded in memory: phrases to objects and places, with the reasons kept.
 
+mod carrier;
 mod described;
 pub(crate) mod geometry;
 mod group;
@@ -29,8 +30,8 @@ use std::{
     collections::BTreeMap,
 };
 
+pub(crate) use carrier::{carrying_centre, like_places, slots, surface_under};
 pub(crate) use history::place_at;
-pub(crate) use place::{carrying_centre, like_places, slots, surface_under};
 
 /// Confidence from which a thing was clearly seen, though once.
 const CLEARLY_SEEN: f64 = 0.4;
