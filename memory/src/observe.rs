@@ -169,6 +169,7 @@ impl Frame<'_, '_, '_> {
         let confused = self.confused_with(id);
         let library = self.draft.library;
         let doubt = self.doubt(id, percept, found);
+        let corrected = self.grounding.displaced.is_some();
         let staged = self.stage.touch(&self.draft.state, id)?;
         let earlier_run = staged.entry.last_seen.episode < moment.episode;
         let low = percept.object.confidence < LOW_CONFIDENCE;
@@ -181,6 +182,10 @@ impl Frame<'_, '_, '_> {
             View::Rejected => {}
             View::Pending(pending) => staged.track.pending = Some(pending),
             View::InHand => remember_view(staged, percept, moment, eye),
+            // A frame that had to be put right tells that a thing is still there, and nothing finer.
+            View::InPlace(_) if corrected && staged.entry.presence == Presence::Present => {
+                staged.entry.last_seen = moment;
+            }
             View::InPlace(parts) => {
                 let back = staged.entry.presence == Presence::Missing;
                 staged.entry.verified = !back && (staged.entry.verified || found.probability >= SURE_MATCH);
@@ -342,7 +347,9 @@ impl Frame<'_, '_, '_> {
             let fraction = view.fraction.clamp(0.0, 1.0);
             staged.track.absences += u32::from(fraction >= STRONG_ABSENCE);
             staged.entry.confidence *= 1.0 - 0.5 * fraction;
-            if staged.track.absences >= 2 || fraction > CERTAIN_ABSENCE {
+            // What is flat is told from what it lies on by its colour alone, and light changes: one view does not decide.
+            let flat = Body::of(&staged.entry.parts, self.draft.library).is_some_and(|body| body.height() < FLAT_M);
+            if staged.track.absences >= 2 || fraction > CERTAIN_ABSENCE && !flat {
                 staged.entry.presence = Presence::Missing;
                 staged.entry.support = None;
                 staged.left = Some(cause);
