@@ -46,6 +46,10 @@ impl Chains {
     pub fn len(&self) -> usize {
         self.packed.get().len()
     }
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
     /// One of them.
     #[inline]
     pub fn get(&self, at: usize) -> Option<&Packed> {
