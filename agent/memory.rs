@@ -71,7 +71,7 @@ fn stats(dir: &Path, as_json: bool) -> anyhow::Result<()> {
         Kind::ALL.into_iter().map(|kind| (kind.word().into(), state.symbols.of_kind(kind).count().into())).collect();
     let told = json!({
         "schema": "acm.memory-stats/2", "objects": state.table.live, "events": state.next,
-        "changes": state.history.deltas.len(), "relations": state.relations.forth.iter().count(),
+        "changes": state.history.len(), "relations": state.relations.forth.iter().count(),
         "words": words, "bytes": {"disk": disk, "hot": bytes.hot, "parts": bytes.parts, "history": bytes.history},
     });
     if as_json {

@@ -196,6 +196,9 @@ pub struct Glance {
     pub hand: HandFeeling,
     /// What it said of the objects that were expected.
     pub visibility: Vec<(ObjectId, Visibility)>,
+    /// How all that it showed was displaced, if it was.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub displaced: Option<crate::observation::Displaced>,
 }
 
 /// Identities that were merged or split.

@@ -19,6 +19,7 @@
 
 mod belief;
 mod consolidate;
+mod constellation;
 mod draft;
 pub mod entry;
 pub mod event;

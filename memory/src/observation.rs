@@ -6,6 +6,7 @@ use acm_concept::{
     ids::ObjectId,
     literal::{Belief, Literal},
     object::Percepts,
+    pose::Pose,
     skill::SkillReport,
     time::Time,
 };
@@ -46,6 +47,35 @@ pub struct Grounding {
     pub missing: Vec<ObjectId>,
     /// Objects that were seen to have moved without the robot's doing.
     pub moved: Vec<ObjectId>,
+    /// Set where all that is verified seemed to have moved in common: then nothing of it is believed to have moved.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub displaced: Option<Displaced>,
+}
+
+/// A frame that shows all that is verified displaced in common: not the world is elsewhere, the camera's view of it is
+/// wrong.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Displaced {
+    /// What explains it.
+    pub by: Displacement,
+    /// How many things that stand apart from each other tell of it.
+    pub things: u32,
+    /// Root mean square distance of these things from where it takes them, metres.
+    pub residual_m: f64,
+    /// Whether it was accounted for: the frame was taken as the camera at its nominal pose would have seen it. Otherwise
+    /// nothing that the frame shows was taken over.
+    pub undone: bool,
+}
+
+/// What displaces all that a frame shows.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Displacement {
+    /// The camera is not where it is said to be: the motion, in the world frame, that takes things from where they are to
+    /// where the frame shows them.
+    Camera(Pose),
+    /// Depths are wrong by this factor.
+    Depth(f64),
 }
 
 /// A finished skill, to be kept as a transition.

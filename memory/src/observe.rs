@@ -1,6 +1,7 @@
 //! Takes a grounded frame: identities, then what each percept, and each absence, changes.
 
 use crate::{
+    constellation,
     draft::{Draft, Stage, Staged},
     entry::{HistoryEntry, Moment, ObjectEntry, PlaceCause, Presence},
     event::{Anchor, Change, Glance, Pending, Track},
@@ -8,7 +9,7 @@ use crate::{
     geometry::{self, Body},
     hand::HandFeeling,
     identity::{self, IdentityRule, MAX_PERCEPTS, Match, Percept, doubt::Doubt, predict},
-    observation::{Grounding, Observation, Resolved},
+    observation::{Displaced, Grounding, Observation, Resolved},
     scene, shown,
     state::MAX_OBJECTS,
 };
@@ -53,20 +54,35 @@ pub(crate) fn observe(draft: &mut Draft<'_>, observation: &Observation<'_>, rule
     let percepts = observation.percepts;
     draft.at(percepts.frame.time);
     let evidence = [Evidence::Frame(percepts.frame.id)];
-    draft.emit(evidence.to_vec(), Change::Frame(glance(observation)));
+    let read = |(index, object)| Percept::read(index, object, draft.library);
+    let mut readable: Vec<Percept<'_>> =
+        percepts.objects.iter().take(MAX_PERCEPTS).enumerate().filter_map(read).collect();
+    let eye = percepts.frame.camera_pose.translation;
+    let displaced = match (percepts.blindness, rule) {
+        (None, IdentityRule::Global) => constellation::displaced(&draft.state, &readable, eye, draft.library),
+        // The paper's rule takes each percept on its own.
+        _ => None,
+    };
+    // What a frame from elsewhere says of where things should be, it says of other places: nobody looked at theirs.
+    let unseen = |view: &ExpectedView| ExpectedView { visibility: Visibility::OutOfView, ..view.clone() };
+    let elsewhere: Vec<ExpectedView> = displaced.iter().flat_map(|_| percepts.expected.iter().map(unseen)).collect();
+    let views = if displaced.is_some() { &elsewhere } else { &percepts.expected };
+    let shows = percepts.blindness.is_none() && displaced.is_none_or(|displaced| displaced.undone);
+    draft.emit(evidence.to_vec(), Change::Frame(glance(observation, views, shows, displaced)));
     let mut stage = Stage::default();
     follow_hand(draft, &mut stage);
-    let mut grounding = Grounding::default();
-    if percepts.blindness.is_none() {
-        if let Some(plane) = percepts.support.filter(|plane| differs(plane, draft.state.support.as_ref())) {
-            draft.emit(evidence.to_vec(), Change::Support(plane));
+    let mut grounding = Grounding { displaced, ..Grounding::default() };
+    if shows {
+        match displaced {
+            Some(displaced) => readable = constellation::undo(&displaced, readable, draft.library),
+            None => {
+                if let Some(plane) = percepts.support.filter(|plane| differs(plane, draft.state.support.as_ref())) {
+                    draft.emit(evidence.to_vec(), Change::Support(plane));
+                }
+            }
         }
-        let read = |(index, object)| Percept::read(index, object, draft.library);
-        let readable: Vec<Percept<'_>> =
-            percepts.objects.iter().take(MAX_PERCEPTS).enumerate().filter_map(read).collect();
-        let matches = identity::resolve(rule, &draft.state, &readable, &percepts.expected, draft.library);
-        let eye = percepts.frame.camera_pose.translation;
-        let mut frame = Frame { draft, stage, views: &percepts.expected, percepts: &readable, eye, grounding };
+        let matches = identity::resolve(rule, &draft.state, &readable, views, draft.library);
+        let mut frame = Frame { draft, stage, views, percepts: &readable, eye, grounding };
         frame.take_matches(&matches, PlaceCause::Seen(percepts.frame.id));
         frame.take_absences(PlaceCause::Gone(percepts.frame.id));
         (stage, grounding) = (frame.stage, frame.grounding);
@@ -76,16 +92,17 @@ pub(crate) fn observe(draft: &mut Draft<'_>, observation: &Observation<'_>, rule
     grounding
 }
 
-fn glance(observation: &Observation<'_>) -> Glance {
+fn glance(observation: &Observation<'_>, views: &[ExpectedView], showed: bool, displaced: Option<Displaced>) -> Glance {
     let percepts = observation.percepts;
     let tcp = observation.feedback.tcp;
     Glance {
         frame: percepts.frame.id,
-        showed: percepts.blindness.is_none(),
+        showed,
         // Numbers that are not finite have no place in the log.
         tcp: if tcp.is_valid() { tcp } else { Pose::IDENTITY },
         hand: HandFeeling::from_feedback(observation.feedback),
-        visibility: percepts.expected.iter().map(|view| (view.object, view.visibility)).collect(),
+        visibility: views.iter().map(|view| (view.object, view.visibility)).collect(),
+        displaced,
     }
 }
 
@@ -154,6 +171,7 @@ impl Frame<'_, '_, '_> {
         let confused = self.confused_with(id);
         let library = self.draft.library;
         let doubt = self.doubt(id, percept, found);
+        let corrected = self.grounding.displaced.is_some();
         let staged = self.stage.touch(&self.draft.state, id)?;
         let earlier_run = staged.entry.last_seen.episode < moment.episode;
         let low = percept.object.confidence < LOW_CONFIDENCE;
@@ -166,6 +184,10 @@ impl Frame<'_, '_, '_> {
             View::Rejected => {}
             View::Pending(pending) => staged.track.pending = Some(pending),
             View::InHand => remember_view(staged, percept, moment, eye),
+            // A frame that had to be put right tells that a thing is still there, and nothing finer.
+            View::InPlace(_) if corrected && staged.entry.presence == Presence::Present => {
+                staged.entry.last_seen = moment;
+            }
             View::InPlace(parts) => {
                 let back = staged.entry.presence == Presence::Missing;
                 staged.entry.verified = !back && (staged.entry.verified || found.probability >= SURE_MATCH);
@@ -330,7 +352,9 @@ impl Frame<'_, '_, '_> {
             let fraction = if taken_in { STRONG_ABSENCE } else { view.fraction.clamp(0.0, 1.0) };
             staged.track.absences += u32::from(fraction >= STRONG_ABSENCE);
             staged.entry.confidence *= 1.0 - 0.5 * fraction;
-            if staged.track.absences >= 2 || fraction > CERTAIN_ABSENCE {
+            // What is flat is told from what it lies on by its colour alone, and light changes: one view does not decide.
+            let flat = Body::of(&staged.entry.parts, self.draft.library).is_some_and(|body| body.height() < FLAT_M);
+            if staged.track.absences >= 2 || fraction > CERTAIN_ABSENCE && !flat {
                 staged.entry.presence = Presence::Missing;
                 staged.entry.support = None;
                 staged.left = Some(cause);

@@ -3,7 +3,7 @@
 use crate::{message::Message, report::Ending};
 use acm_concept::{embodiment::Feedback, pose::Pose, skill::SkillReport};
 use acm_llm::Answer;
-use acm_memory::observation::{Grounding, Note, Outcome, Verdict};
+use acm_memory::observation::{Displaced, Displacement, Grounding, Note, Outcome, Verdict};
 use acm_planner::Decision;
 
 /// How much a line matters.
@@ -197,7 +197,16 @@ fn changes(grounding: &Grounding) -> String {
     ] {
         text += &listed(&format!("{word} "), list.into_iter(), "; ");
     }
-    text
+    match &grounding.displaced {
+        Some(Displaced { by: Displacement::Camera(_), undone: true, .. }) => {
+            text + "the camera was moved: accounted for"
+        }
+        Some(Displaced { by: Displacement::Camera(_), .. }) => text + "the camera was moved: nothing taken over",
+        Some(Displaced { by: Displacement::Depth(factor), .. }) => {
+            text + &format!("depths are wrong by a factor of {factor:.2}: nothing taken over")
+        }
+        None => text,
+    }
 }
 
 fn note_words(note: &Note) -> String {

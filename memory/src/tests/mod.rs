@@ -1,6 +1,7 @@
 //! Tests of the whole memory through its trait, over hand-made percepts.
 #![allow(clippy::unwrap_used, clippy::expect_used)] // a failed step is a failed test
 
+mod constellation;
 mod doors;
 mod durability;
 mod episodes;

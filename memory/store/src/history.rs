@@ -2,7 +2,8 @@
 
 use crate::{
     Id, Nanos,
-    cow::{Grown, Run},
+    chain::{Builder, Chains, Packed, WIDE},
+    cow::Grown,
     event::Sure,
     symbols::Symbol,
 };
@@ -29,30 +30,49 @@ pub const FIRST: Key = 16;
 /// The moment is not the commit's less a number of microseconds; it is kept aside.
 const ASIDE: u32 = u32::MAX;
 
-/// One change: 20 bytes, and 12 more where its value is wide.
+/// A change that came since the chains were sorted: 20 bytes, and 12 more where its value is wide.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
-pub struct Delta {
+struct Delta {
     /// The object's change before it, 1 + index; 0 for none.
-    pub before: u32,
-    /// Sequence number of the event.
-    pub sequence: u32,
+    before: u32,
     /// How many microseconds before its commit it was so.
     earlier_us: u32,
+    packed: Packed,
+}
+
+/// A change as it is read from a chain.
+#[derive(Debug, Clone, Copy)]
+pub struct Step {
+    /// Its place among all changes.
+    index: u32,
+    /// The object's change before it, 1 + index; 0 for none.
+    before: u32,
+    packed: Packed,
+}
+
+impl Step {
     /// What changed.
-    pub key: Key,
-    /// Number of the source among [`crate::Kind::Source`] words, and confidence in steps of 1/255.
-    pub origin: [u8; 2],
-    /// The new value, by key; of a wide one its place.
-    value: u32,
+    #[inline]
+    pub fn key(&self) -> Key {
+        self.packed.key
+    }
+    /// Sequence number of the event.
+    #[inline]
+    pub fn sequence(&self) -> u64 {
+        u64::from(self.packed.sequence)
+    }
 }
 
 /// Whether values of a key have three words: positions, rotations, numbers and relations.
 fn is_wide(key: Key, value: [u32; 3]) -> bool {
     matches!(key, POSITION | ROTATION) || key >= FIRST && (value[1] != 0 || value[2] != 0)
 }
-/// Marks a value whose three words stand elsewhere, where its key alone does not tell.
-const WIDE: u32 = 1 << 31;
+/// Whether a key has values of three words. Weights are negative numbers, whose first bit is set as that of a wide value is.
+#[inline]
+fn may_be_wide(key: Key) -> bool {
+    key != CONFIDENCE
+}
 
 /// When the events up to one came to be known.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
@@ -67,12 +87,12 @@ pub struct Known {
 /// All changes of all objects.
 #[derive(Debug, Clone, Default)]
 pub struct History {
-    /// The changes.
-    pub deltas: Grown<Delta>,
-    /// Wide values.
-    pub wide: Grown<[u32; 3]>,
-    /// How many of the changes lie object by object.
-    pub sorted: usize,
+    /// The changes up to when they were sorted.
+    pub(crate) sorted: Chains,
+    /// Those since.
+    fresh: Grown<Delta>,
+    /// Wide values of those since.
+    wide: Grown<[u32; 3]>,
     /// Moments that do not fit into the changes themselves.
     pub aside: Arc<BTreeMap<u32, Nanos>>,
     /// The commits.
@@ -132,28 +152,55 @@ impl History {
         let at = self.commits.partition_point(|commit| commit.time <= time);
         at.checked_sub(1).and_then(|at| self.commits.get(at)).map_or(0, |commit| commit.next)
     }
+    /// How many changes there are.
+    pub fn len(&self) -> usize {
+        self.sorted.len() + self.fresh.len()
+    }
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+    /// Whether all changes lie object by object.
+    pub fn is_sorted(&self) -> bool {
+        self.fresh.is_empty()
+    }
+    #[inline]
+    fn step(&self, index: u32) -> Option<Step> {
+        let at = index as usize;
+        if let Some(packed) = self.sorted.get(at) {
+            let before = if self.sorted.starts(at) { 0 } else { index };
+            return Some(Step { index, before, packed: *packed });
+        }
+        let delta = self.fresh.get(at - self.sorted.len())?;
+        Some(Step { index, before: delta.before, packed: delta.packed })
+    }
+    #[inline]
+    fn earlier_us(&self, step: &Step) -> u32 {
+        let at = step.index as usize;
+        match at.checked_sub(self.sorted.len()) {
+            None => self.sorted.earlier_us(at, &step.packed),
+            Some(at) => self.fresh.get(at).map_or(0, |delta| delta.earlier_us),
+        }
+    }
     /// Since when a change is so.
-    pub fn valid(&self, index: u32, delta: &Delta) -> Nanos {
-        self.valid_or(index, delta, 0)
+    pub fn valid(&self, step: &Step) -> Nanos {
+        self.valid_or(step, 0)
     }
     /// The same, where the present batch comes to be known at `present`.
-    pub fn valid_or(&self, index: u32, delta: &Delta, present: Nanos) -> Nanos {
-        match delta.earlier_us {
-            ASIDE => self.aside.get(&index).copied().unwrap_or(0),
-            earlier => {
-                let known = self.known_or(u64::from(delta.sequence), present);
-                known.saturating_sub(u64::from(earlier) * 1000)
-            }
+    pub fn valid_or(&self, step: &Step, present: Nanos) -> Nanos {
+        match self.earlier_us(step) {
+            ASIDE => self.aside.get(&step.index).copied().unwrap_or(0),
+            earlier => self.known_or(step.sequence(), present).saturating_sub(u64::from(earlier) * 1000),
         }
     }
     /// Whether a change was so at `valid`, where all events before `until` were known by then.
     #[inline]
-    fn was(&self, index: u32, delta: &Delta, valid: Nanos, until: u64) -> bool {
-        match delta.earlier_us {
-            ASIDE => self.aside.get(&index).is_some_and(|moment| *moment <= valid),
-            _ if u64::from(delta.sequence) < until => true,
+    fn was(&self, step: &Step, valid: Nanos, until: u64) -> bool {
+        match self.earlier_us(step) {
+            ASIDE => self.aside.get(&step.index).is_some_and(|moment| *moment <= valid),
+            _ if step.sequence() < until => true,
             0 => false,
-            earlier => self.known(u64::from(delta.sequence)).saturating_sub(u64::from(earlier) * 1000) <= valid,
+            earlier => self.known(step.sequence()).saturating_sub(u64::from(earlier) * 1000) <= valid,
         }
     }
     /// Adds a change and gives its place, 1 + index.
@@ -167,7 +214,7 @@ impl History {
         before: u32,
     ) -> u32 {
         let (valid, known) = change;
-        let index = self.deltas.len() as u32;
+        let index = self.len() as u32;
         let earlier = known.checked_sub(valid).filter(|ns| ns % 1000 == 0).map(|ns| ns / 1000);
         let earlier_us = match earlier.and_then(|us| u32::try_from(us).ok()) {
             Some(us) if us < ASIDE => us,
@@ -182,96 +229,94 @@ impl History {
         } else {
             value[0]
         };
-        self.deltas.push(Delta { before, sequence, earlier_us, key, origin, value });
+        self.fresh.push(Delta { before, earlier_us, packed: Packed { sequence, value, key, origin } });
         index + 1
     }
     /// The value of a change.
     #[inline]
-    pub fn value(&self, delta: &Delta) -> [u32; 3] {
-        // Weights are negative numbers, whose first bit is set as well.
-        if delta.value & WIDE == 0 || delta.key == CONFIDENCE {
-            return [delta.value, 0, 0];
+    pub fn value(&self, step: &Step) -> [u32; 3] {
+        let (at, packed) = (step.index as usize, &step.packed);
+        if at < self.sorted.len() {
+            return self.sorted.value(at, packed, may_be_wide(packed.key));
         }
-        self.wide.get((delta.value & !WIDE) as usize).copied().unwrap_or_default()
+        if packed.value & WIDE == 0 || !may_be_wide(packed.key) {
+            return [packed.value, 0, 0];
+        }
+        self.wide.get((packed.value & !WIDE) as usize).copied().unwrap_or_default()
     }
     /// Whether so much came since the changes were sorted that they should be sorted again.
     pub fn is_loose(&self) -> bool {
-        self.deltas.len() - self.sorted > 65_536.max(self.sorted / 2)
+        self.fresh.len() > 65_536.max(self.sorted.len() / 2)
     }
     /// Lays the changes of each object side by side, so that reading a chain touches a few cache lines. `last` are the ends
     /// of all chains; they are set to where they are then. A chain only leads to earlier changes, so that two passes in
-    /// the order of the changes do, and none waits for the change before it.
+    /// the order of the changes find all places, and none waits for the change before it.
     pub fn sort<'a>(&mut self, last: impl Iterator<Item = &'a mut u32>) {
         const NOBODY: u32 = u32::MAX;
         let ends: Vec<&mut u32> = last.filter(|end| **end > 0).collect();
-        let deltas: Vec<Delta> = self.deltas.iter().copied().collect();
-        // Whose each change is, and from where on its chain and its wide values lie.
-        let mut owner = vec![NOBODY; deltas.len()];
-        let mut chains = vec![(0u32, 0u32); ends.len()];
+        // Whose each change is, and where its chain begins and goes on.
+        let mut owner = vec![NOBODY; self.len()];
+        let mut lengths = vec![0u32; ends.len()];
         for (chain, end) in (0u32..).zip(&ends) {
             if let Some(owner) = owner.get_mut(**end as usize - 1) {
                 *owner = chain;
             }
         }
-        let points_aside = |delta: &Delta| delta.value & WIDE != 0 && delta.key != CONFIDENCE;
-        for (at, delta) in deltas.iter().enumerate().rev() {
-            let chain = owner[at];
-            let Some((count, wide)) = chains.get_mut(chain as usize) else { continue };
-            *count += 1;
-            *wide += u32::from(points_aside(delta));
-            if let Some(owner) = (delta.before as usize).checked_sub(1).and_then(|before| owner.get_mut(before)) {
+        for index in (0..self.len() as u32).rev() {
+            let chain = owner[index as usize];
+            let Some(length) = lengths.get_mut(chain as usize) else { continue };
+            *length += 1;
+            let before = self.step(index).map_or(0, |step| step.before);
+            if let Some(owner) = (before as usize).checked_sub(1).and_then(|before| owner.get_mut(before)) {
                 *owner = chain;
             }
         }
-        let (mut count, mut wides) = (0, 0);
-        for chain in &mut chains {
-            let (length, wide) = *chain;
-            *chain = (count, wides);
-            (count, wides) = (count + length, wides + wide);
+        let mut count = 0;
+        let mut next: Vec<u32> = Vec::with_capacity(lengths.len());
+        for length in lengths {
+            next.push(count);
+            count += length;
         }
-        let starts: Vec<u32> = chains.iter().map(|(start, _)| *start).collect();
-        let mut sorted: Vec<Delta> = vec![Zeroable::zeroed(); count as usize];
-        let mut wide = vec![[0u32; 3]; wides as usize];
-        for (at, delta) in deltas.iter().enumerate() {
-            let chain = owner[at] as usize;
-            let (Some((next, next_wide)), Some(start)) = (chains.get_mut(chain), starts.get(chain)) else { continue };
-            let before = if next == start { 0 } else { *next };
-            let mut delta = Delta { before, ..*delta };
-            if points_aside(&delta)
-                && let Some(place) = wide.get_mut(*next_wide as usize)
-            {
-                *place = self.value(&delta);
-                delta.value = WIDE | *next_wide;
-                *next_wide += 1;
+        let starts = next.clone();
+        // Which change comes to each place, and the other way round.
+        let mut source = vec![NOBODY; count as usize];
+        for (index, owner) in (0u32..).zip(&mut owner) {
+            let Some(next) = next.get_mut(*owner as usize) else { continue };
+            if let Some(source) = source.get_mut(*next as usize) {
+                *source = index;
             }
-            if let Some(place) = sorted.get_mut(*next as usize) {
-                *place = delta;
-            }
-            owner[at] = *next;
+            *owner = *next;
             *next += 1;
+        }
+        let mut sorted = Builder::new(count as usize, self.sorted.pool.get().len() + 3 * self.wide.len());
+        let mut starts = starts.into_iter().peekable();
+        for (place, index) in (0u32..).zip(source) {
+            let first = starts.next_if_eq(&place).is_some();
+            let Some(step) = self.step(index) else { continue };
+            let value = self.value(&step);
+            let wide = is_wide(step.key(), value);
+            sorted.put(place as usize, step.packed, self.earlier_us(&step), value, wide, first);
         }
         let moved = |(index, moment): (&u32, &Nanos)| {
             owner.get(*index as usize).filter(|place| **place != NOBODY).map(|place| (*place, *moment))
         };
         self.aside = Arc::new(self.aside.iter().filter_map(moved).collect());
-        for (end, (next, _)) in ends.into_iter().zip(&chains) {
-            *end = *next;
+        for (end, next) in ends.into_iter().zip(next) {
+            *end = next;
         }
-        self.sorted = sorted.len();
-        (self.deltas, self.wide) = (Grown::of(Run::Owned(sorted)), Grown::of(Run::Owned(wide)));
+        (self.sorted, self.fresh, self.wide) = (sorted.finish(), Grown::default(), Grown::default());
     }
-    /// The changes of a chain, latest known first, with their indices.
-    pub fn chain(&self, last: u32) -> impl Iterator<Item = (u32, &Delta)> {
+    /// The changes of a chain, latest known first.
+    pub fn chain(&self, last: u32) -> impl Iterator<Item = Step> {
         let mut next = last;
         std::iter::from_fn(move || {
-            let index = next.checked_sub(1)?;
-            let delta = self.deltas.get(index as usize)?;
-            next = delta.before;
-            Some((index, delta))
+            let step = self.step(next.checked_sub(1)?)?;
+            next = step.before;
+            Some(step)
         })
     }
-    /// The value of each asked key at `valid` as it was known at `known`. `ordered`: no change of the chain is of an
-    /// earlier moment than the one before it. A key that did not change by then keeps `None`; so do those of which `never`
+    /// The value of each asked key at `valid` as it was known at `known`. `ordered`: no change of a property is of
+    /// an earlier moment than the one before it. A key that did not change by then keeps `None`; so do those of which `never`
     /// says that they did not change at all.
     pub fn at<const N: usize>(
         &self,
@@ -287,28 +332,32 @@ impl History {
         if missing == 0 {
             return [None; N];
         }
-        for (index, delta) in self.chain(last) {
-            if u64::from(delta.sequence) >= until_known || !self.was(index, delta, valid, until_valid) {
+        let mut implied = Implied::default();
+        for step in self.chain(last) {
+            if step.sequence() >= until_known || !self.was(&step, valid, until_valid) {
                 continue;
             }
-            let Some(slot) = keys.iter().position(|key| *key == delta.key).and_then(|at| found.get_mut(at)) else {
+            let moment = if ordered { 0 } else { implied.read(self, &step) };
+            let Some(slot) = keys.iter().position(|key| *key == step.key()).and_then(|at| found.get_mut(at)) else {
                 continue;
             };
             if ordered {
                 if slot.is_none() {
-                    *slot = Some((0, self.value(delta)));
+                    *slot = Some((0, self.value(&step)));
                     missing -= 1;
                     if missing == 0 {
                         break;
                     }
                 }
-            } else {
-                let moment = self.valid(index, delta);
+            } else if slot.is_none_or(|(best, _)| moment > best) {
                 // Later known first: of equal moments the one that was known last counts.
-                if slot.is_none_or(|(best, _)| moment > best) {
-                    *slot = Some((moment, self.value(delta)));
-                }
+                *slot = Some((moment, self.value(&step)));
             }
+        }
+        if let Some(slot) = keys.iter().position(|key| *key == ROTATION).and_then(|at| found.get_mut(at))
+            && let Some(first) = implied.first(slot.map_or(0, |(best, _)| best))
+        {
+            *slot = Some(first);
         }
         found.map(|value| value.map(|(_, value)| value))
     }
@@ -316,13 +365,13 @@ impl History {
     pub fn changes(&self, last: u32) -> Vec<Change> {
         let mut all: Vec<Change> = self
             .chain(last)
-            .map(|(index, delta)| Change {
-                valid: self.valid(index, delta),
-                known: self.known(u64::from(delta.sequence)),
-                sequence: u64::from(delta.sequence),
-                key: delta.key,
-                origin: (delta.origin[0], f32::from(delta.origin[1]) / 255.0),
-                value: self.value(delta),
+            .map(|step| Change {
+                valid: self.valid(&step),
+                known: self.known(step.sequence()),
+                sequence: step.sequence(),
+                key: step.key(),
+                origin: (step.packed.origin[0], f32::from(step.packed.origin[1]) / 255.0),
+                value: self.value(&step),
             })
             .collect();
         all.reverse();
@@ -330,10 +379,46 @@ impl History {
     }
     /// Bytes that it takes.
     pub fn bytes(&self) -> usize {
-        self.deltas.len() * size_of::<Delta>()
+        self.sorted.bytes()
+            + self.fresh.len() * size_of::<Delta>()
             + self.wide.len() * 12
             + self.aside.len() * 24
             + self.commits.len() * size_of::<Known>()
+    }
+}
+
+/// Rotations that were left out. Whoever says where a thing is says how it is turned; where that was as before, and nothing
+/// of the chain was out of order yet, only the position was written down. In a chain that came out of order later, such a
+/// position stands for the rotation before it, at its own moment.
+#[derive(Default)]
+struct Implied {
+    /// The latest moment of a position since the rotation that was read last.
+    open: Option<Nanos>,
+    /// The rotation of the earliest moment: what it was from the beginning.
+    first: Option<(Nanos, [u32; 3])>,
+}
+
+impl Implied {
+    /// Takes the next step of a chain, latest known first, and gives the moment for which it counts.
+    fn read(&mut self, history: &History, step: &Step) -> Nanos {
+        let moment = history.valid(step);
+        match step.key() {
+            // A rotation of the same event has the same moment and is read before it: it counts.
+            POSITION => self.open = self.open.max(Some(moment)),
+            ROTATION => {
+                if self.first.is_none_or(|(first, _)| moment <= first) {
+                    self.first = Some((moment, history.value(step)));
+                }
+                return self.open.take().map_or(moment, |open| open.max(moment));
+            }
+            _ => {}
+        }
+        moment
+    }
+    /// The first rotation, if positions before all written ones stand for it at a later moment than `best`.
+    fn first(self, best: Nanos) -> Option<(Nanos, [u32; 3])> {
+        let (open, (_, value)) = self.open.zip(self.first)?;
+        (open > best).then_some((open, value))
     }
 }
 

@@ -18,6 +18,7 @@
 //! | [`forget`], [`compact`] | what must leave no byte behind, and what nobody will ask for |
 
 pub mod block;
+pub mod chain;
 pub mod compact;
 pub mod condition;
 pub mod cow;

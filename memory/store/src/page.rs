@@ -10,7 +10,8 @@ use bytemuck::{Pod, Zeroable};
 
 /// The object was put at least once.
 pub const KNOWN: u8 = 1;
-/// Some of its changes came later than changes of later moments.
+/// Some of its changes came later than changes of later moments. A property's value from the beginning, which is written down
+/// when it first changes, is not meant: no change of that property comes before it.
 pub const DISORDERED: u8 = 2;
 
 /// What is kept by id, side by side: whoever asks for one of an object's numbers mostly asks for others too.

@@ -3,9 +3,10 @@
 use crate::{
     State,
     block::{Bits, Hot, Mask},
+    chain::{Chains, Packed},
     cow::{Grown, Run, Stored},
     event::Part,
-    history::{Delta, Known},
+    history::Known,
     map::Map,
     page::{Heads, Page},
     region::{Regions, Search},
@@ -17,7 +18,7 @@ use crate::{
 use bytemuck::{Pod, Zeroable};
 use std::{collections::BTreeMap, sync::Arc};
 
-const MAGIC: [u8; 8] = *b"ACM-SNP3";
+const MAGIC: [u8; 8] = *b"ACM-SNP4";
 /// Room for more sections than there are.
 const SECTIONS: usize = 32;
 const ALIGN: usize = 64;
@@ -94,12 +95,11 @@ pub fn write(state: &State, batch: u64, document: &[u8]) -> Vec<u8> {
     out.slice(state.relations.forth.sorted());
     out.slice(state.relations.back.sorted());
     out.slice(state.numbers.sorted());
-    out.section(|bytes| {
-        state.history.deltas.iter().for_each(|delta| bytes.extend_from_slice(bytemuck::bytes_of(delta)))
-    });
-    out.section(|bytes| {
-        state.history.wide.iter().for_each(|value| bytes.extend_from_slice(bytemuck::cast_slice(value)))
-    });
+    let chains = &state.history.sorted;
+    out.slice(chains.packed.get());
+    out.slice(chains.pool.get());
+    out.slice(chains.starts.get());
+    out.slice(chains.timed.get());
     out.slice(&aside);
     out.section(|bytes| {
         state.history.commits.iter().for_each(|known| bytes.extend_from_slice(bytemuck::bytes_of(known)))
@@ -199,14 +199,16 @@ fn unpack(map: &Arc<Map>, head: &Head) -> Option<Found> {
         forth,
         back,
         numbers,
-        deltas,
-        wide,
+        packed,
+        pool,
+        starts,
+        timed,
         aside,
         commits,
         points,
         planes,
         rest,
-    ] = *head.sections.first_chunk::<19>()?;
+    ] = *head.sections.first_chunk::<21>()?;
     let bytes = |section: Section| map.slice::<u8>(section.at as usize, section.length as usize);
     let mut symbols: Symbols = serde_json::from_slice(bytes(words)?).ok()?;
     symbols.reindex();
@@ -240,9 +242,12 @@ fn unpack(map: &Arc<Map>, head: &Head) -> Option<Found> {
     state.relations.forth = Sorted::of(run::<Edge>(map, forth)?);
     state.relations.back = Sorted::of(run::<Back>(map, back)?);
     state.numbers = Sorted::of(run::<Number>(map, numbers)?);
-    state.history.deltas = Grown::of(run::<Delta>(map, deltas)?);
-    state.history.wide = Grown::of(run::<[u32; 3]>(map, wide)?);
-    state.history.sorted = state.history.deltas.len();
+    state.history.sorted = Chains {
+        packed: Arc::new(run::<Packed>(map, packed)?),
+        pool: Arc::new(run::<u32>(map, pool)?),
+        starts: Arc::new(run::<u64>(map, starts)?),
+        timed: Arc::new(run::<u64>(map, timed)?),
+    };
     let aside = run::<[u64; 2]>(map, aside)?;
     let aside: BTreeMap<u32, u64> = aside.get().iter().map(|[index, moment]| (*index as u32, *moment)).collect();
     state.history.aside = Arc::new(aside);

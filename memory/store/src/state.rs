@@ -91,7 +91,7 @@ impl State {
                 }
             });
         }
-        if self.history.is_loose() || all && self.history.sorted < self.history.deltas.len() {
+        if self.history.is_loose() || all && !self.history.is_sorted() {
             let State { history, pages, .. } = self;
             history
                 .sort(pages.all_mut().flat_map(|page| page.heads.get_mut().of.iter_mut().map(|head| &mut head.last)));
@@ -283,7 +283,7 @@ impl State {
         }
     }
     fn changed(&self, last: u32, key: Key) -> bool {
-        self.history.chain(last).any(|(_, delta)| delta.key == key)
+        self.history.chain(last).any(|step| step.key() == key)
     }
 
     fn apply_op(&mut self, op: &Op, context: Context) {
@@ -344,22 +344,24 @@ impl State {
         let bit = bit(key);
         let mut last = heads.of[at].last;
         let history = &mut self.history;
-        let known_before =
-            heads.of[at].touched & bit != 0 && (key < FIRST || history.chain(last).any(|(_, delta)| delta.key == key));
-        if !known_before && let Some(old) = old {
+        // The chain is walked last: it costs more than all the rest.
+        let is_first =
+            || heads.of[at].touched & bit == 0 || key >= FIRST && !history.chain(last).any(|step| step.key() == key);
+        if let Some(old) = old
+            && is_first()
+        {
             let (born, first) = (heads.of[at].born, heads.of[at].first);
             let known = history.known_or(u64::from(first), context.known);
             last = history.add((born, known), first, key, heads.of[at].origin, old, last);
-            // It goes behind changes of other properties that are of later moments.
-            heads.of[at].flags |= if heads.of[at].latest > born { DISORDERED } else { 0 };
         }
         heads.of[at].touched |= bit;
         let late = context.valid < heads.of[at].latest;
         let newest = !late || {
             heads.of[at].flags |= DISORDERED;
-            let newer = |(index, delta): (u32, &history::Delta)| {
-                delta.key == key && history.valid_or(index, delta, context.known) > context.valid
-            };
+            // A position stands for the rotation too.
+            let tells = |of: Key| of == key || key == history::ROTATION && of == history::POSITION;
+            let newer =
+                |step: history::Step| tells(step.key()) && history.valid_or(&step, context.known) > context.valid;
             !history.chain(last).any(newer)
         };
         last = history.add((context.valid, context.known), context.sequence, key, context.origin, new, last);
@@ -473,15 +475,15 @@ impl State {
     fn shift(&mut self, id: Id, position: [f32; 3], rotation: [f32; 3], context: Context) {
         let Some((row, (heads, at))) = self.row(id).zip(self.head(id)) else { return };
         let old_rotation = heads.of[at].rotation;
-        let heads_touched = heads.of[at].touched & 1 << history::ROTATION != 0;
+        let in_order = heads.of[at].flags & DISORDERED == 0 && context.valid >= heads.of[at].latest;
         let Some(old) = self.table.at(row).map(|(block, at)| block.position(at)) else { return };
         let (new, before) = (history::of_position(position), history::of_position(old));
         if self.change(id, history::POSITION, new, Some(before), context) && old != position {
             self.table.shift(row, position);
             (self.is_still, _) = (false, self.moved.push(id));
         }
-        // A rotation that stays is left out where nothing of it was ever written: most things are moved upright.
-        let turned = old_rotation != rotation || heads_touched;
+        // A rotation that stays is left out, as most things are moved upright: the position stands for it.
+        let turned = old_rotation != rotation || !in_order;
         let (new, old) = (history::of_position(rotation), history::of_position(old_rotation));
         if turned
             && self.change(id, history::ROTATION, new, Some(old), context)
@@ -592,8 +594,6 @@ impl State {
             let heads = page.heads.get_mut();
             heads.of[id as usize % ROWS].last = last;
             heads.of[id as usize % ROWS].touched |= bit(key);
-            // Its moment lies before those that are in the chain already.
-            heads.of[id as usize % ROWS].flags |= DISORDERED;
         }
     }
 }

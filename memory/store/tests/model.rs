@@ -39,7 +39,9 @@ fn batch(world: &mut World, reference: &Naive, time: u64, next: &mut Id) -> Vec<
             }
             (5..8, Some(id)) => {
                 let room = world.draw.below(world.words.regions.len());
-                Op::Move(id, world.place(room), [0.0, 0.0, world.draw.unit() * 0.5])
+                // Many a thing is moved without being turned.
+                let turn = [0.0, 0.25, world.draw.unit() * 0.5][world.draw.below(3)];
+                Op::Move(id, world.place(room), [0.0, 0.0, turn])
             }
             (8..11, Some(id)) => {
                 let state = world.words.states[world.draw.below(4)];
