@@ -176,15 +176,18 @@ fn sample(episodes: &[Episode], held_out: bool, count: usize) -> Vec<(&Episode, 
 pub fn measure_rules(_args: &BenchArgs, result: &mut BenchResult) -> anyhow::Result<()> {
     let (Some(tasks), Some(episodes)) = (tabletop(result)?, episodes(result)?) else { return Ok(()) };
     let (planner, abilities) = (Planner::new()?, Abilities::read()?);
+    let suites: Vec<(String, Vec<String>)> =
+        Scenario::suites().into_iter().map(|suite| (suite.clone(), Scenario::suite(&suite))).collect();
+    let alone = ("scenarios".to_owned(), Scenario::names());
     let mut families: BTreeMap<&str, BTreeSet<String>> = BTreeMap::new();
     let library = acm_memory::whole_library()?;
-    let names = Scenario::names();
-    for name in &names {
-        let (family, _) = name.split_once('/').unwrap_or(("scenarios", name));
-        let scenario = Scenario::open(name)?;
-        for text in scenario.paraphrases().iter().map(String::as_str).chain([scenario.instruction()]) {
-            let fired = planner.rules(text, &library).with_context(|| format!("scenario {name}: {text}"))?;
-            families.entry(family).or_default().extend(fired);
+    for (family, names) in suites.iter().chain([&alone]) {
+        for name in names {
+            let scenario = Scenario::open(name)?;
+            for text in scenario.paraphrases().iter().map(String::as_str).chain([scenario.instruction()]) {
+                let fired = planner.rules(text, &library).with_context(|| format!("scenario {name}: {text}"))?;
+                families.entry(family).or_default().extend(fired);
+            }
         }
     }
     for task in tasks.values().flatten() {

@@ -240,6 +240,7 @@ pub(crate) struct Words {
     pub measures: Vec<Form>,
     pub twins: Vec<Form>,
     pub twin_alone: Vec<Form>,
+    pub conjunctions: Vec<Form>,
     pub own_links: Vec<Form>,
     pub signs: Vec<Form>,
     pub what: Vec<Form>,

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test that panics fails, which is what it shall do")]
 
 use acm_concept::template::TemplateLibrary;
-use acm_planner::{ParseError, Planner, Task};
+use acm_planner::{Destination, Goal, ParseError, Planner, Task};
 use proptest::prelude::*;
 use std::sync::OnceLock;
 
@@ -355,6 +355,44 @@ fn states_parts_containers_and_tools_are_read() {
             .any(|r| r.quantity == acm_planner::task::Quantity::Count(2))
     );
     assert_eq!(wide("Put the bowl with the spoon in it on the tray.").references[0].phrase, "the spoon");
+}
+
+#[test]
+fn what_a_moved_thing_holds_is_read_wherever_it_is_said() {
+    for (text, held) in [
+        ("Put a pot with a spatula and a ladle in the box.", 2),
+        ("Put the pot with a spatula in it, on the mat.", 1),
+        ("Put the pot on the mat with a spatula in it.", 1),
+        ("Put a pot of eggs on the mat.", 1),
+    ] {
+        let task = wide(text);
+        assert_eq!(task.outline().len(), 1, "{text}: {:?}", task.outline());
+        let pot = task.references.iter().find(|known| known.noun.as_deref() == Some("pot")).unwrap();
+        assert_eq!(pot.contains.len(), held, "{text}");
+    }
+    let (planner, library) = whole_library();
+    let error = planner.parse("Put the pot with a drawer in it on the mat.", library).unwrap_err();
+    assert!(error.to_string().contains("no kind of drawer that I know can be moved"), "{error}");
+}
+
+#[test]
+fn what_is_said_of_several_things_is_said_of_each() {
+    for text in [
+        "Put the spatula plus the ladle in the box.",
+        "Put the spatula along with the ladle in the box.",
+        "Pick up the spatula and the ladle, put in the box.",
+        "Pick up the spatula and the ladle and put them in the box.",
+    ] {
+        let task = wide(text);
+        let noun = |index: usize| task.references[index].noun.clone().unwrap_or_default();
+        let moved = |goal: &Goal| match goal {
+            Goal::At { object, destination: Destination::In { reference } } => (noun(*object), noun(*reference)),
+            other => panic!("{text}: {other:?}"),
+        };
+        let moves: Vec<(String, String)> = task.subtasks.iter().map(|subtask| moved(&subtask.goal)).collect();
+        let expected = ["spatula", "ladle"].map(|noun| (noun.to_owned(), "box".to_owned()));
+        assert_eq!(moves, expected, "{text}");
+    }
 }
 
 #[test]

@@ -2,10 +2,13 @@
 
 use super::{
     reader::{Captures, Expected, Reader},
-    role::Role,
+    role::{CONTAINS, Role},
     syntax::{Clause, NounPhrase, PlaceKind, PlacePhrase, Pronoun, Relation},
 };
-use crate::lexicon::{FrameForm, FrameGoal};
+use crate::{
+    lexicon::{FrameForm, FrameGoal},
+    task::functions_with_effect,
+};
 use std::cmp::Reverse;
 
 /// Auxiliaries in a row: "should have been".
@@ -49,8 +52,10 @@ impl Reader<'_> {
             }
             // What asks for something goes before what only mentions it.
             let asks = |clause: &Clause| clause.goal != FrameGoal::Nothing;
+            // "A plate with a fork and a knife" is one thing with two on it.
             let rank = |clause: &Clause, end: usize| {
-                (end, asks(clause), Reverse(clause.places_named()), self.described_last(clause))
+                let told_apart = Reverse((clause.places_named(), clause.also.len()));
+                (end, asks(clause), told_apart, self.described_last(clause))
             };
             if best.as_ref().is_none_or(|(best, longest)| rank(&clause, end) > rank(best, *longest)) {
                 best = Some((clause, end));
@@ -78,14 +83,16 @@ impl Reader<'_> {
     /// Whether what stands last describes the place and not the thing: "the fork in the mug on the table" goes into the
     /// mug that is on the table, "in the drawer next to the stove" is one place. What carries things and cannot be
     /// moved stands on nothing: "the cube on the left mat" goes on the right mat.
-    fn described_last(&self, clause: &Clause) -> bool {
-        let Some(PlacePhrase { kind: PlaceKind::At(phrase, _), .. }) = &clause.place else { return false };
+    fn described_last(&self, clause: &Clause) -> u8 {
+        let Some(PlacePhrase { kind: PlaceKind::At(phrase, _), .. }) = &clause.place else { return 0 };
         match phrase.located.as_deref().map(|place| &place.kind) {
-            None => false,
+            None => 0,
             Some(PlaceKind::At(_, Relation::On | Relation::In)) => {
-                phrase.noun.is_some() && Role::Effect("at".into()).fits(self.library, phrase.noun.as_deref())
+                let moved =
+                    phrase.noun.is_some() && Role::Effect("at".into()).fits(self.library, phrase.noun.as_deref());
+                if moved { 2 } else { 0 }
             }
-            Some(_) => true,
+            Some(_) => 1,
         }
     }
 
@@ -146,18 +153,61 @@ impl Reader<'_> {
                     continue;
                 }
                 let mut clause = self.filled(begin, end, index, number, captures);
+                if !self.tool_serves(&clause) {
+                    continue;
+                }
                 clause.history = history.filter(|_| clause.place.is_none());
                 clause.times = clause.times.or(*times);
+                readings.extend(self.filled_after(&clause, end));
                 readings.push((clause, end));
             }
         }
         readings
     }
 
+    /// "Put the pan on the table with a fork in it": what the moved thing holds, said after the place, which holds nothing.
+    fn filled_after(&self, clause: &Clause, at: usize) -> Vec<(Clause, usize)> {
+        let words = &self.lexicon.words;
+        let holds = |phrase: &NounPhrase| Role::Affordance(CONTAINS).fits(self.library, phrase.noun.as_deref());
+        let (Some(object), Some(PlacePhrase { kind: PlaceKind::At(place, _), .. })) = (&clause.object, &clause.place)
+        else {
+            return Vec::new();
+        };
+        let meant = object.noun.is_some() && object.contains.is_empty() && clause.also.is_empty();
+        if !meant || !holds(object) || holds(place) {
+            return Vec::new();
+        }
+        let mut readings = Vec::new();
+        for start in self.class(at, &words.containing) {
+            for ((first, also), end) in self.noun_phrase_lists(start, 1) {
+                let inside = self.longest(end, &words.prepositions_in).is_some();
+                let contains = [std::slice::from_ref(&first), &also].concat();
+                let object = NounPhrase { contains, ..object.clone() };
+                for end in self.class(end, &words.within_it).into_iter().filter(|_| inside) {
+                    readings.push((Clause { object: Some(object.clone()), ..clause.clone() }, end));
+                }
+            }
+        }
+        readings
+    }
+
+    /// Whether the tool, where it must be in some state, is of a kind that can be brought into it.
+    fn tool_serves(&self, clause: &Clause) -> bool {
+        let state = self.lexicon.frames.get(clause.frame).and_then(|frame| frame.tool_state.as_deref());
+        let (Some(state), Some(tool)) = (state, &clause.tool) else { return true };
+        !functions_with_effect(self.library, state).is_empty()
+            && Role::Effect(state.to_owned()).fits(self.library, tool.noun.as_deref())
+    }
+
     fn filled(&self, begin: usize, end: usize, frame: usize, form: usize, captures: Captures) -> Clause {
+        let goal = self.lexicon.frames.get(frame).map_or(FrameGoal::Nothing, |frame| match &captures.tool {
+            // "Look at the card" needs nothing done, "look at it under the lamp" needs both together.
+            Some(_) if frame.tool_state.is_some() => FrameGoal::Holding(true),
+            _ => frame.goal.clone(),
+        });
         Clause {
             span: self.span(begin, end),
-            goal: self.lexicon.frames.get(frame).map_or(FrameGoal::Nothing, |frame| frame.goal.clone()),
+            goal,
             object: captures.object,
             also: captures.also,
             place: captures.place,

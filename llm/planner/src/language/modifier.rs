@@ -34,6 +34,7 @@ impl Reader<'_> {
             readings.extend(self.side(phrase, start));
             if phrase.located.is_none() {
                 readings.extend(self.located(phrase, start, depth));
+                readings.extend(self.set_off(phrase, start, depth));
             }
         }
         readings.extend(self.part_of(phrase, at, depth));
@@ -89,6 +90,7 @@ impl Reader<'_> {
         let from: Vec<(Relation, usize)> = sources.collect();
         for (_, end) in &from {
             places.extend(self.beside(*end, depth + 1));
+            places.extend(self.between(*end, depth + 1));
         }
         let behind =
             from.iter().flat_map(|(_, end)| self.relations(*end)).filter(|(relation, _)| *relation != Relation::To);
@@ -109,9 +111,19 @@ impl Reader<'_> {
         own.into_iter().chain(placed).collect()
     }
 
+    /// "the counter, left of the sink": where on a thing that stays where it is.
+    fn set_off(&self, phrase: &NounPhrase, at: usize, depth: u32) -> Phrases {
+        let fixed = phrase.noun.is_some() && !Role::Effect("at".into()).fits(self.library, phrase.noun.as_deref());
+        if !fixed || !self.is_comma(at) {
+            return Vec::new();
+        }
+        let places = self.beside(at + 1, depth + 1).into_iter();
+        places.map(|(place, end)| (NounPhrase { located: Some(Box::new(place)), ..phrase.clone() }, end)).collect()
+    }
+
     /// "of the cabinet".
     fn part_of(&self, phrase: &NounPhrase, at: usize, depth: u32) -> Phrases {
-        if !self.is_word(at, "of") || phrase.part_of.is_some() || phrase.noun.is_none() {
+        if !self.is_word(at, "of") || phrase.part_of.is_some() || phrase.noun.is_none() || self.measures(phrase) {
             return Vec::new();
         }
         let wholes = self.noun_phrases(at + 1, depth + 1).into_iter();
@@ -156,7 +168,10 @@ impl Reader<'_> {
         }
         let words = &self.lexicon.words;
         let mut readings = Vec::new();
-        for start in self.class(at, &words.containing) {
+        let mut starts = self.class(at, &words.containing);
+        // "a pot of apples": where pots are things, what one holds is in it.
+        starts.extend((self.is_word(at, "of") && self.measures(phrase)).then_some(at + 1));
+        for start in starts {
             // "a holder with a gauge": what shows something is part of it.
             readings.extend(self.signs(start).into_iter().map(|end| (phrase.clone(), end)));
             for ((first, also), end) in self.noun_phrase_lists(start, depth + 1) {

@@ -1,6 +1,11 @@
 //! Nouns: what the library calls things, and everyday words for it.
 
-use super::reader::Reader;
+use super::{
+    reader::Reader,
+    role::{CONTAINS, Role},
+    syntax::NounPhrase,
+};
+use crate::lexicon::{Element, Form};
 
 /// The state of what is spoken of as a slice.
 pub(super) const SLICED: &str = "sliced";
@@ -79,11 +84,26 @@ impl Reader<'_> {
                 .singulars(measured)
                 .into_iter()
                 .find_map(|(one, _)| self.noun_of(&format!("{} {one}", reading.noun)));
-            if let Some((noun, _)) = compound {
-                reading.noun = noun;
+            match compound {
+                Some((noun, _)) => reading.noun = noun,
+                // "a pot of apples" is a pot where there are pots, and apples else.
+                None if self.plain_noun(at).is_some_and(|container| self.holds(&container.noun)) => return None,
+                None => {}
             }
         }
         Some(reading)
+    }
+
+    /// Whether a phrase is a measure that is a thing of its own here: a pot, a box.
+    pub(super) fn measures(&self, phrase: &NounPhrase) -> bool {
+        let Some(noun) = phrase.noun.as_deref().filter(|noun| self.holds(noun)) else { return false };
+        let one_of =
+            |form: &Form| matches!(&form[..], [Element::Words { any, .. }] if any.iter().any(|word| word == noun));
+        self.lexicon.words.measures.iter().any(one_of)
+    }
+
+    fn holds(&self, noun: &str) -> bool {
+        Role::Affordance(CONTAINS).fits(self.library, Some(noun))
     }
 
     /// The singulars that a word may be of, with whether it is a plural.

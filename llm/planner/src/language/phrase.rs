@@ -53,8 +53,10 @@ impl Reader<'_> {
         }
         // "the edge of the tub" is the tub.
         let article = self.longest(at, &self.lexicon.words.definite).unwrap_or(at);
-        let article = self.meaning(article, &self.lexicon.directions).map_or(article, |(_, end)| end);
-        for end in self.class(article, &self.lexicon.words.whereabouts) {
+        // "the far corner of the desk"; in "the back of the toilet" the side itself is the place, "in front of it" is another.
+        let described = self.meaning(article, &self.lexicon.directions).map(|(_, end)| end);
+        let starts = Some(article).filter(|start| *start > at || described.is_none()).into_iter().chain(described);
+        for end in starts.flat_map(|start| self.class(start, &self.lexicon.words.whereabouts)) {
             readings.extend(self.noun_phrases(end, depth + 1).into_iter().filter(|(phrase, _)| phrase.noun.is_some()));
         }
         keep_longest_first(&mut readings);
@@ -220,7 +222,9 @@ impl Reader<'_> {
                 let compound = NounPhrase { noun: Some(part.noun), part_of, quantity, ..phrase.clone() };
                 named.push((compound, part.end));
             }
-            named.push((phrase, reading.end));
+            // "two remote's": an apostrophe too many.
+            let counted = matches!(phrase.quantity, Quantity::Count(_)) && self.is_word(reading.end, "'s");
+            named.push((phrase, reading.end + usize::from(counted)));
         }
         named
     }

@@ -232,7 +232,10 @@ impl<'a> Reader<'a> {
                 None => Vec::new(),
             },
             Slot::Place => {
-                let places = self.places(at, depth).into_iter();
+                // "a bowl with a spoon in it, in the sink": what is in a thing may be set off from where the thing goes.
+                let filled = captures.object.as_ref().is_some_and(|object| !object.contains.is_empty());
+                let start = if filled && self.is_comma(at) { at + 1 } else { at };
+                let places = self.places(start, depth).into_iter();
                 places.map(|(place, end)| with(&|c| c.place = Some(place.clone()), end)).collect()
             }
             Slot::Towards => {
@@ -274,11 +277,12 @@ impl<'a> Reader<'a> {
             let mut longer = Vec::new();
             for (list, end) in &open {
                 // Before a list is ended by "and", commas part its members.
-                let (comma, and) = (self.is_stop(*end), self.is_word(*end, "and"));
-                let start = if comma && self.is_word(end + 1, "and") { end + 2 } else { end + 1 };
-                if !(comma || and) || (comma && !self.list_goes_on(start)) {
-                    continue;
-                }
+                let comma = self.is_stop(*end);
+                let start = match self.longest(end + usize::from(comma), &self.lexicon.words.conjunctions) {
+                    Some(start) => start,
+                    None if comma && self.list_goes_on(end + 1) => end + 1,
+                    None => continue,
+                };
                 for (next, end) in self.noun_phrases(start, depth) {
                     let mut list = list.clone();
                     list.1.push(next);
@@ -302,7 +306,7 @@ impl<'a> Reader<'a> {
         let verb = |place: &usize| self.word(*place).is_some_and(|word| self.lexicon.verbs.contains_key(word));
         (at.saturating_sub(1)..self.tokens.len().min(at + MAX_LIST_WORDS))
             .take_while(|place| !verb(place))
-            .any(|place| self.is_word(place, "and"))
+            .any(|place| self.longest(place, &self.lexicon.words.conjunctions).is_some())
     }
     /// A noun or a word for a thing, with adjectives: it says nothing here.
     fn kinds(&self, at: usize) -> Vec<usize> {

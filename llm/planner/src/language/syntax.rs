@@ -159,7 +159,7 @@ impl NounPhrase {
         let of = |phrase: &NounPhrase| 1 + phrase.places_named();
         self.located.as_ref().map_or(0, |place| 1 + place.places_named())
             + self.part_of.as_deref().map_or(0, of)
-            + self.contains.iter().map(of).sum::<usize>()
+            + self.contains.iter().map(of).max().unwrap_or_default()
     }
     /// Whether it names several things.
     pub fn several(&self) -> bool {

@@ -47,6 +47,7 @@ struct RawWords {
     measures: Vec<String>,
     twins: Vec<String>,
     twin_alone: Vec<String>,
+    conjunctions: Vec<String>,
     own_links: Vec<String>,
     signs: Vec<String>,
     what: Vec<String>,
@@ -198,6 +199,9 @@ struct RawSense {
     into_any: bool,
     particle: Option<String>,
     with: Option<String>,
+    /// Of the forms those with a tool alone.
+    #[serde(default)]
+    needs_tool: bool,
 }
 
 #[derive(Deserialize)]
@@ -316,6 +320,7 @@ fn closed_classes(raw: &RawWords) -> Result<Words, LexiconError> {
         measures: phrases(&raw.measures)?,
         twins: phrases(&raw.twins)?,
         twin_alone: phrases(&raw.twin_alone)?,
+        conjunctions: phrases(&raw.conjunctions)?,
         own_links: phrases(&raw.own_links)?,
         signs: phrases(&raw.signs)?,
         what: phrases(&raw.what)?,
@@ -427,7 +432,8 @@ fn frame(raw: &RawFrame, sense: &RawSense) -> Result<Frame, LexiconError> {
         let form = form("verbs.toml", &text)?;
         Ok(FrameForm { form, history: raw.history, times: raw.times, vary: raw.vary, needs_sign: raw.needs_sign })
     };
-    let forms = raw.forms.iter().map(read).collect::<Result<_, _>>()?;
+    let usable = |raw: &&RawForm| !sense.needs_tool || raw.form.contains("{tool}");
+    let forms = raw.forms.iter().filter(usable).map(read).collect::<Result<_, _>>()?;
     Ok(Frame {
         name: raw.name.clone(),
         goal,
@@ -595,6 +601,7 @@ fn known_words(lexicon: &Lexicon) -> BTreeSet<String> {
         &w.measures,
         &w.twins,
         &w.twin_alone,
+        &w.conjunctions,
         &w.own_links,
         &w.signs,
         &w.what,

@@ -113,6 +113,12 @@ impl Interpretation<'_> {
             {
                 return Ok(vec![covered]);
             }
+            // "Pick up the fork and the knife and put in the sink".
+            let taken = |draft: &Draft| matches!(draft.subtask.goal, Goal::Holding { held: true, .. });
+            let together = self.acted_on_together();
+            if together.len() > 1 && self.drafts.last().is_some_and(taken) {
+                return Ok(together);
+            }
             return match self.antecedent(clause.span, &role) {
                 Err(ParseError::NoAntecedent { .. }) if matches!(role, Role::Function(_)) => {
                     Ok(vec![self.unnamed(clause.span, &role)])

@@ -335,8 +335,23 @@ impl Interpretation<'_> {
             }
             kept.push(draft);
         }
-        self.drafts = kept;
+        let part = |at: usize| moved_next(kept.get(at..).unwrap_or_default());
+        let parts: Vec<bool> = (0..kept.len()).map(part).collect();
+        self.drafts = kept.into_iter().zip(parts).filter(|(_, part)| !part).map(|(draft, _)| draft).collect();
     }
+}
+
+/// "Pick up the fork and the knife and put them in the sink": whether the first of these takes what is moved after all
+/// that is taken.
+fn moved_next(drafts: &[Draft]) -> bool {
+    let Some((Draft { subtask: Subtask { goal: Goal::Holding { object: taken, held: true }, .. }, guard, .. }, next)) =
+        drafts.split_first()
+    else {
+        return false;
+    };
+    let takes = |draft: &&Draft| matches!(draft.subtask.goal, Goal::Holding { held: true, .. });
+    let moves = |draft: &&Draft| draft.guard == *guard && matches!(draft.subtask.goal, Goal::At { .. });
+    next.iter().skip_while(takes).take_while(moves).any(|draft| draft.subtask.goal.object() == Some(*taken))
 }
 
 /// Whether a goal is one that is tried, or done a number of times.

@@ -71,6 +71,10 @@ impl Interpretation<'_> {
         }
         let mut contains = Vec::new();
         for content in &phrase.contains {
+            // What is moved takes along what is in it: nothing that stays where it is.
+            if Role::Effect("at".into()).fits(self.library, phrase.noun.as_deref()) {
+                self.check_role(content, &Role::Effect("at".into()))?;
+            }
             contains.push(self.reference(content, &Role::Mentioned)?);
         }
         let mut reference = ObjectReference {
@@ -201,20 +205,45 @@ impl Interpretation<'_> {
         if let Some(Goal::At { object, destination: Destination::On { reference } | Destination::In { reference } }) =
             self.drafts.last().map(|draft| &draft.subtask.goal)
             && !self.quantity_several(*object)
+            && self.can_be_moved(*reference)
             && self.references.get(*reference).is_some_and(|carrier| role.fits(self.library, carrier.noun.as_deref()))
         {
             return Ok(vec![*reference]);
         }
+        let together = self.acted_on_together();
+        if together.len() > 1 {
+            return Ok(together);
+        }
+        let can = |known: &ObjectReference| role.fits(self.library, known.noun.as_deref());
+        let several_named = self.references.iter().rposition(|known| several(known) && can(known));
+        let plural_named = || self.references.iter().rposition(|known| self.plural_of_one(known) && can(known));
+        several_named.or_else(plural_named).map(|index| vec![index]).ok_or_else(|| self.no_antecedent(span))
+    }
+
+    /// What the last clause was about, in the order of the text.
+    pub(super) fn acted_on_together(&self) -> Vec<ReferenceIndex> {
         let clause = self.drafts.last().map(|draft| draft.subtask.span);
         let same = self.drafts.iter().rev().take_while(|draft| Some(draft.subtask.span) == clause);
         let mut together: Vec<ReferenceIndex> = same.filter_map(|draft| draft.subtask.goal.object()).collect();
         together.reverse();
         together.dedup();
-        if together.len() > 1 {
-            return Ok(together);
-        }
-        let fits = |known: &ObjectReference| several(known) && role.fits(self.library, known.noun.as_deref());
-        self.references.iter().rposition(fits).map(|index| vec![index]).ok_or_else(|| self.no_antecedent(span))
+        together
+    }
+
+    fn can_be_moved(&self, index: ReferenceIndex) -> bool {
+        let noun = self.references.get(index).and_then(|known| known.noun.as_deref());
+        Role::Effect("at".into()).fits(self.library, noun)
+    }
+
+    /// Whether one thing was named by a plural: "the keys".
+    fn plural_of_one(&self, known: &ObjectReference) -> bool {
+        let Some(noun) = known.noun.as_deref() else { return false };
+        let words: Vec<String> = known.phrase.split_whitespace().map(str::to_lowercase).collect();
+        let means = |name: &str| name == noun || self.lexicon.meanings(name).any(|meant| meant == noun);
+        (1..=2)
+            .flat_map(|length| words.windows(length))
+            .map(|name| name.join(" "))
+            .any(|name| name.ends_with('s') && means(&name))
     }
 
     pub(super) fn no_antecedent(&self, span: Span) -> ParseError {
