@@ -117,19 +117,26 @@ impl Body {
     }
 }
 
-/// What two measurements of one surface differ by, metres.
-const SAME_SURFACE_M: f64 = 0.008;
+/// What two measurements of one wall differ by, sideways, and of one floor, upwards; metres.
+const SAME_WALL_M: f64 = 0.006;
+const SAME_FLOOR_M: f64 = 0.003;
 
 /// The share of the solids of `parts` that lies in the solids of `other`, or as near as two measurements of one surface do:
-/// of points spread evenly in their boxes. What stands within walls shares nothing with them.
+/// of points spread evenly in their boxes. What stands within walls shares nothing with them, and little with the floor.
 pub(crate) fn shared(parts: &[GroundedPart], other: &[GroundedPart], library: &TemplateLibrary) -> f64 {
     let solids = |parts: &[GroundedPart]| -> Vec<PlacedSolid> {
         let placed = parts.iter().filter_map(|part| Some((part.pose.pose, library.solids_of(part)?)));
-        placed
-            .flat_map(|(at, own)| own.into_iter().map(move |s| PlacedSolid { solid: s.solid, pose: at * s.pose }))
-            .collect()
+        let own = |(at, own): (Pose, Vec<PlacedSolid>)| {
+            own.into_iter().map(move |s| PlacedSolid { solid: s.solid, pose: at * s.pose })
+        };
+        placed.flat_map(own).collect()
     };
     let others = solids(other);
+    let beside = [DVec2::ZERO, DVec2::X, DVec2::NEG_X, DVec2::Y, DVec2::NEG_Y].map(|side| side * SAME_WALL_M);
+    let is_in = |point: DVec3| {
+        let near = |side: &DVec2| others.iter().any(|o| o.signed_distance(point + side.extend(0.0)) < SAME_FLOOR_M);
+        beside.iter().any(near)
+    };
     let (mut inside, mut all) = (0usize, 0usize);
     for solid in solids(parts) {
         let half = solid.solid.half_extents();
@@ -137,7 +144,7 @@ pub(crate) fn shared(parts: &[GroundedPart], other: &[GroundedPart], library: &T
             let share = |axis: u32| f64::from((step / 3i32.pow(axis)) % 3 - 1) * 0.8;
             let point = solid.pose.transform_point(DVec3::new(share(0), share(1), share(2)) * half);
             all += 1;
-            inside += usize::from(others.iter().any(|other| other.signed_distance(point) < SAME_SURFACE_M));
+            inside += usize::from(is_in(point));
         }
     }
     inside as f64 / all.max(1) as f64

@@ -14,6 +14,7 @@ use crate::{
     state::MAX_OBJECTS,
 };
 use acm_concept::{
+    color::Appearance,
     ids::ObjectId,
     literal::Evidence,
     object::{ExpectedView, GroundedPart, SupportPlane, Visibility},
@@ -44,8 +45,9 @@ const FRAGMENT_AREA: f64 = 0.7;
 /// A scrap has less than this share of the area of what it belongs to, and touches it within so much, metres.
 const SCRAP_AREA: f64 = 0.5;
 const SCRAP_GAP_M: f64 = 0.01;
-/// What shares more than this of its place with something larger is part of that.
+/// What shares more than this of its place with something larger is part of that; less is enough if they are of one colour.
 const TAKEN_IN: f64 = 0.75;
+const TAKEN_IN_ALIKE: f64 = 0.4;
 /// Matches above this probability may verify an object.
 const SURE_MATCH: f64 = 0.6;
 
@@ -252,7 +254,7 @@ impl Frame<'_, '_, '_> {
         let full = self.draft.state.objects.len() + self.stage.added() >= MAX_OBJECTS;
         let piece = self.is_piece_of_known(percept, found, matches)
             || self.is_fragment(percept, matches)
-            || self.is_part_of_shown(None, &percept.parts)
+            || self.is_part_of_shown(None, &percept.parts, &object.appearance)
             || self.is_scrap(percept);
         if object.confidence < FALSE_ALARM || full || piece {
             return None;
@@ -367,17 +369,19 @@ impl Frame<'_, '_, '_> {
     /// Whether what was taken for a thing, and never moved by the robot, is part of something larger that this frame shows.
     fn is_taken_in(&self, entry: &ObjectEntry) -> bool {
         let own = |known: &HistoryEntry| matches!(known.cause, PlaceCause::Own(_) | PlaceCause::Grasped(_));
-        !entry.history.iter().any(own) && self.is_part_of_shown(Some(entry.id), &entry.parts)
+        !entry.history.iter().any(own) && self.is_part_of_shown(Some(entry.id), &entry.parts, &entry.appearance)
     }
 
     /// Whether some parts are part of something larger that this frame shows: two solids cannot share a place.
-    fn is_part_of_shown(&self, own: Option<ObjectId>, parts: &[GroundedPart]) -> bool {
+    fn is_part_of_shown(&self, own: Option<ObjectId>, parts: &[GroundedPart], color: &Appearance) -> bool {
         let library = self.draft.library;
         let Some(body) = Body::of(parts, library).filter(|body| body.height() > FLAT_M) else { return false };
         let shown = self.grounding.resolved.iter().filter(|found| found.accepted && Some(found.object) != own);
         shown.filter_map(|found| self.stage.entry(&self.draft.state, found.object)).any(|other| {
             let larger = Body::of(&other.parts, library).is_some_and(|b| FRAGMENT_AREA * b.area() > body.area());
-            larger && geometry::shared(parts, &other.parts, library) > TAKEN_IN
+            let alike = other.appearance.mean.distance(&color.mean) < SAME_COLOR;
+            let least = if alike { TAKEN_IN_ALIKE } else { TAKEN_IN };
+            larger && geometry::shared(parts, &other.parts, library) > least
         })
     }
 }

@@ -1,5 +1,6 @@
-//! What the robot itself put where memory expects it: its identity and its sizes are in no doubt, so that it is looked for by
-//! its own solids and colour, also where it stands in something, or touches what memory does not explain.
+//! What is looked for where memory expects it by its own solids and colour, also where it stands in something, or touches what
+//! memory does not explain: what the robot itself put there, whose identity and sizes are in no doubt, and what only memory or
+//! the instruction calls for.
 
 use super::explained::{Explained, has_its_colors};
 use crate::{
@@ -42,8 +43,17 @@ pub(super) fn find<'a>(
     let mut taken = vec![false; scene.grid.len()];
     explained.iter().flat_map(|thing| &thing.pixels).for_each(|&pixel| taken[pixel] = true);
     let is_left = |ghost: &&Ghost| !explained.iter().any(|thing| thing.id == ghost.id);
+    let on_call = |ghost: &Ghost| {
+        let template = ghost.known().and_then(|known| context.library.get(&known.part.template));
+        template.is_some_and(|template| template.on_call)
+    };
+    let looked_for =
+        |ghost: &&Ghost| !ghost.held && !ghost.flat && (ghost.was_put || on_call(ghost) && ghost.is_seen());
+    // What was put into something is found before that.
+    let (first, then): (Vec<&Ghost>, Vec<&Ghost>) =
+        remembered.ghosts.iter().filter(looked_for).filter(is_left).partition(|ghost| ghost.was_put);
     let mut found = Vec::new();
-    for ghost in remembered.ghosts.iter().filter(|ghost| ghost.was_put && !ghost.held && !ghost.flat).filter(is_left) {
+    for ghost in first.into_iter().chain(then) {
         if let Some(thing) = of(scene, context, ghost, &remembered.ghosts, &taken) {
             thing.pixels.iter().for_each(|&pixel| taken[pixel] = true);
             found.push(thing);
