@@ -125,7 +125,7 @@ pub(crate) fn rank<'a>(context: Context<'a>, measured: &Measured, evidence: &Evi
     let near: Vec<Approach> = starts
         .into_par_iter()
         .filter(|s| s.rough < FORLORN_FACTOR * least + FORLORN_COST)
-        .filter_map(|s| s.nearest(&rough))
+        .flat_map_iter(|s| s.near(&rough))
         .collect();
     let best = near.iter().map(|a| a.cost).fold(f64::INFINITY, f64::min);
     // What is far behind after the rough fit is not worth a fine one, unless what was ahead does not admit what it comes to.
@@ -140,6 +140,15 @@ pub(crate) fn rank<'a>(context: Context<'a>, measured: &Measured, evidence: &Evi
     if scored.is_empty() {
         scored = rest.into_par_iter().filter_map(fitted).collect();
     }
+    scored.sort_by(|a, b| b.score.total_cmp(&a.score));
+    // Of what was fitted along and across the better counts.
+    let mut seen: Vec<(&str, Option<DQuat>)> = Vec::new();
+    scored.retain(|found| {
+        let stance = (found.model.template.name.as_str(), found.model.rest.map(Rest::turn));
+        let new = !seen.contains(&stance);
+        seen.push(stance);
+        new
+    });
     scored.extend(track(context, measured, &rectangles, evidence));
     scored.sort_by(|a, b| b.score.total_cmp(&a.score));
     if let Some(other) = scored.first().and_then(|best| tipped::read_anew(context, best, evidence)) {
@@ -187,6 +196,8 @@ struct Starts<'a> {
     starts: Vec<(Model<'a>, Vec<f64>)>,
     /// Rough cost of the first.
     rough: f64,
+    /// Whether the second lies across the first.
+    both: bool,
 }
 
 impl<'a> Starts<'a> {
@@ -251,21 +262,30 @@ impl<'a> Starts<'a> {
             own.zip(first).is_some_and(|(a, b)| (2.0 * (a - b)).cos() < 0.0)
         };
         let two_sides = template.on_call && rated.first().is_some_and(|(_, model, _)| model.has_two_sides());
-        if let Some(other) = rated.iter().position(across).filter(|_| two_sides) {
+        let other = rated.iter().position(across).filter(|_| two_sides);
+        if let Some(other) = other {
             let other = rated.remove(other);
             rated.insert(1, other);
         }
         rated.truncate(if turns { STARTS } else { 1 });
-        Some(Starts { starts: rated.into_iter().map(|(_, model, start)| (model, start)).collect(), rough })
+        let both = turns && other.is_some();
+        Some(Starts { starts: rated.into_iter().map(|(_, model, start)| (model, start)).collect(), rough, both })
     }
 
-    /// The best of the starts, brought near to a minimum.
-    fn nearest(self, evidence: &Evidence) -> Option<Approach<'a>> {
-        let near = self.starts.into_iter().map(|(model, start)| {
-            let state = approach(&model, evidence, &start);
-            Approach { cost: cost(&model, evidence, &state), model, state }
-        });
-        near.min_by(|a, b| a.cost.total_cmp(&b.cost))
+    /// The best of the starts, brought near to a minimum; both of what lies along and across, which only a fine fit tells
+    /// apart.
+    fn near(self, evidence: &Evidence) -> Vec<Approach<'a>> {
+        let mut near: Vec<Approach<'a>> = self
+            .starts
+            .into_iter()
+            .map(|(model, start)| {
+                let state = approach(&model, evidence, &start);
+                Approach { cost: cost(&model, evidence, &state), model, state }
+            })
+            .collect();
+        near.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        near.truncate(if self.both { STARTS } else { 1 });
+        near
     }
 }
 

@@ -14,7 +14,7 @@ pub(crate) fn guess(template: &Template, measured: &Measured, evidence: &Evidenc
 }
 
 pub(crate) fn fit(template: &Template, measured: &Measured, evidence: &Evidence) -> Option<Estimate> {
-    finish(starts(template, measured, evidence)?.nearest(evidence)?, evidence)
+    finish(starts(template, measured, evidence)?.near(evidence).into_iter().next()?, evidence)
 }
 
 pub(crate) fn fit_from(
