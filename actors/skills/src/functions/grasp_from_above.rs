@@ -35,6 +35,9 @@ const TIP_CLEARANCE_M: f64 = 0.004;
 /// How much deeper a retry reaches, metres, and how many retries go on deepening.
 const DEEPER_M: f64 = 0.007;
 const DEEPENING_ATTEMPTS: u32 = 2;
+/// Fingers that land at more than this share of the part's height stand on it, or beside it on something too high to hold
+/// the part well from there.
+const LANDING: f64 = 0.62;
 /// The test tug is a gentle lift by this much, metres.
 const TUG_M: f64 = 0.025;
 /// What was taken is raised by this much at least, metres: for anybody to see that it is.
@@ -115,7 +118,7 @@ impl GraspFromAbove {
             plan: GraspPlan {
                 travel_m: pre_height_m - grip_height_m,
                 width_m: approach.width_m,
-                landed_before_m: pre_height_m - hand.tip_reach_m - 0.5 * (support_m + top_m),
+                landed_before_m: pre_height_m - hand.tip_reach_m - (support_m + LANDING * (top_m - support_m)),
                 attached: false,
             },
             pre_height_m,
