@@ -210,6 +210,23 @@ fn a_fragment_of_a_thing_that_is_seen_whole_is_no_thing_of_its_own() {
 }
 
 #[test]
+fn what_was_taken_for_a_thing_and_is_part_of_a_larger_one_is_no_longer_believed() {
+    let mut memory = memory();
+    let strip = Thing::block([0.12, 0.03, 0.04]).at(0.04, 0.0, 0.0);
+    let upper = Thing::block([0.05, 0.03, 0.04]).at(0.0, 0.0, 0.08);
+    let seen = |id: u64| (ObjectId(id), Visibility::Seen, 0.9);
+    look(&mut memory, 0, 0.0, &[strip, upper], &[], &open_hand(0.0)).unwrap();
+    // The whole is told from what it was taken for, while the camera looks through neither of the two.
+    let whole = || [Thing::block([0.3, 0.2, 0.08]).at(0.0, 0.05, 0.0)];
+    for frame in 1..4 {
+        look(&mut memory, frame, frame as f64, &whole(), &[seen(1), seen(2)], &open_hand(frame as f64)).unwrap();
+    }
+    assert_eq!(object(&memory, ObjectId(1)).presence, Presence::Missing);
+    // What stands on it keeps its place.
+    assert_eq!(object(&memory, ObjectId(2)).presence, Presence::Present);
+}
+
+#[test]
 fn the_halves_of_a_mat_on_both_sides_of_an_arm_are_one_mat_and_a_small_mat_on_it_is_another() {
     let mut memory = memory();
     let mat = |length: f64, x: f64| Thing::mat(length, 0.1).at(x, 0.0, 0.0).colored([90, 160, 90]);

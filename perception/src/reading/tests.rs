@@ -141,6 +141,23 @@ fn a_needle_points_where_it_points() {
 }
 
 #[test]
+fn a_needle_that_ends_at_a_mark_of_the_scale_is_read() {
+    // The mark runs out of the dial, so that the needle is not surrounded by its ground.
+    let readings = read_face(|x, y| {
+        let (right, up) = (x as f64 - 60.0, 50.0 - y as f64);
+        match right.hypot(up) {
+            far if far > 32.0 => [60, 60, 65],
+            _ if right.abs() < 2.0 && up > 25.0 => [60, 60, 65],
+            _ if right.abs() < 2.0 && up > -4.0 => [200, 30, 30],
+            _ => [240, 240, 235],
+        }
+    });
+    let [Reading { content: Content::Needle { angle_deg, .. }, .. }] = &readings[..] else { panic!("{readings:?}") };
+    let error = (angle_deg + 180.0).rem_euclid(360.0) - 180.0;
+    assert!(error.abs() < 4.0, "{angle_deg}");
+}
+
+#[test]
 fn what_is_no_writing_gives_no_reading() {
     assert_eq!(read_face(|_, _| BODY), []);
     assert_eq!(read_face(|x, _| if x / 7 % 2 == 0 { BODY } else { [30, 30, 90] }), []);
