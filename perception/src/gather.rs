@@ -191,8 +191,12 @@ fn core(scene: &Scene, pixels: &[usize]) -> Option<Vec<usize>> {
 pub(crate) fn drop_empty(scene: &Scene, ranked: &mut Vec<Hypothesis>) {
     let limit = |found: &Hypothesis| if found.model.template.on_call { EMPTY } else { MOSTLY_EMPTY };
     let is_full = |found: &Hypothesis| empty(scene, found) <= limit(found);
+    let Some(best) = ranked.first().map(|best| (best.model.template.on_call, best.score)) else { return };
     if let Some(full) = ranked.iter().position(is_full) {
-        ranked.drain(..full);
+        // What explains all else much better may be right, and the bare surface of its colour.
+        if best.0 || ranked[full].score > best.1 - SPOKEN_OF {
+            ranked.drain(..full);
+        }
     }
 }
 
